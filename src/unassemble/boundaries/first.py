@@ -1,6 +1,6 @@
 """First fits of a mesh to its whole entries: from conformal maps of guesses, or from drawings without crossings."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 
@@ -18,7 +18,7 @@ from .rim import Rim
 
 # Weights of the prior, one after the other, and once more.
 _FADING = (0.1, 0.01, 1e-3, 0.0)
-_SLOWLY = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
 def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[tuple[Fit, bool]]:
@@ -30,7 +30,7 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
     fit = _settled(problem, rim, conformal, newton)
     if fit is not None:
         yield fit, True
-    for fading, start in ((_FADING, conformal), (_SLOWLY, None))[fit is not None :]:
+    for fading, start in ((_FADING, conformal), (SLOWLY, None))[fit is not None :]:
         first = _start(problem, rim, fading[0], start)
         if first is not None:
             yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False

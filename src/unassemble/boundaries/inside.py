@@ -111,11 +111,8 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
         found = shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
         if found[0].misfit <= EXACT:
             return found
-        if not again:
-            flat = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
-            if flat is not None and flat[0].misfit <= EXACT:
-                return flat
-    return found
+    flat = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
+    return flat if flat is not None and flat[0].misfit <= EXACT else found
 
 
 def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim] | None:

@@ -24,20 +24,17 @@ from ..metric.heron import angles, areas_cotangents, blocks_of, heron, longest_s
 from ..planar.conformal import conformal_map
 from ..planar.frame import fit_similarity
 from ..planar.polish import polish
+from ..tolerances import LAST_DIGITS, ROUNDED, SUMMED
 from ..topology.pieces import planar_pieces
+from .first import SLOWLY
 from .fit import Fit, FitOptions, WholeEntries
 from .patch import nearest
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
 
-_FADING = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
-_AGAIN = _FADING[2:]  # from a metric that is nearly flat
-_FITS = 1e-14, 1e-10  # of entries, that is rounding, and that may be where it does not fall
-_FLAT = 1e-11  # radians that are rounding
-_HELPS = 0.95  # as much as less of a prior has to leave of the curvature
-_STEPS, _LAST, _TRIALS = 5, 15, 4
-_MOST = 400  # factorisations, more than the meshes that come back this way need
+_OPTIONS = FitOptions(steps=5, last_steps=15, trials=4)
+_MOST = 400  # factorisations, more than meshes that come back this way need
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,7 @@ def fit_lengths(
     Positions z (n,) are those to start from. Where the rim comes to no flat metric, it is peeled next to peaks of the
     curvature.
     """
-    piece, fading = rim.piece, list(_FADING)
+    piece, fading = rim.piece, SLOWLY
     scale = problem.best_scale(z, rim.whole)
     u = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]]) ** 2
     if not (heron(u[piece.opposite]) > 0).all():
@@ -84,7 +81,7 @@ def fit_lengths(
             if here is None or not len(lengths.inside):
                 return None
             here = lengths.flat(here, fading, free_scale=problem.known_scale is None)
-            if here.bent <= _FLAT:
+            if here.bent <= ROUNDED:
                 found = _laid_out(rim, lengths.edges, here.weights, z)
                 return (
                     None
@@ -95,7 +92,7 @@ def fit_lengths(
             return None
         finally:
             lengths.release()
-        u[lengths.edges], scale, fading, left = here.u, here.scale, list(_AGAIN), lengths.left
+        u[lengths.edges], scale, fading, left = here.u, here.scale, SLOWLY[2:], lengths.left
         hot = np.zeros(piece.n_vertices)
         hot[lengths.inside] = np.abs(here.curvature)
         less = rim.peeled(hot[piece.edges].max(axis=1), 0.25 * float(hot.max()))
@@ -193,7 +190,7 @@ class _Lengths:
                 return None
             rest = (here.weights - wanted)[free]
             size = float(np.abs(rest).max(initial=0.0))
-            if size < _FITS[0] or (size < _FITS[1] and size > last / 2):
+            if size < LAST_DIGITS or (size < SUMMED and size > last / 2):
                 return here
             last = size
             matrix = UpperTriangle.of(sp.csr_array(-here.hessian[free][:, free]))
@@ -211,18 +208,18 @@ class _Lengths:
         last = np.inf
         for mu in mus:
             damping, cost = 1e-8, here.cost(mu)
-            for _ in range(_STEPS if mu else _LAST):
+            for _ in range(_OPTIONS.steps if mu else _OPTIONS.last_steps):
                 before = cost
-                for _ in range(_TRIALS):
+                for _ in range(_OPTIONS.trials):
                     found = self._tried(here, mu, damping, free_scale=free_scale)
                     if found is not None and found.cost(mu) < cost:
                         here, cost, damping = found, found.cost(mu), damping / 10
                         break
                     damping = max(10 * damping, 1e-7)
-                if self.left <= 0 or cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3) * before:
+                if self.left <= 0 or cost <= ROUNDED**2 * len(self.inside) or cost > (1 - 1e-3) * before:
                     break
             _log.debug("mu %.0e: curvature %.1e, %d factorisations left", mu, here.bent, self.left)
-            if self.left <= 0 or not _FLAT < here.bent < _HELPS * last:
+            if self.left <= 0 or not ROUNDED < here.bent < 0.95 * last:  # less of a prior no longer helps
                 break
             last = here.bent
         return here
