@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import GeometryError, RecoveryError, SolverError
+from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
-from ..planar.cotangent import edge_weights
-from ..planar.piece import positions
+from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED, ROUNDED
 from ..topology import Piece, local_numbering, surfaces
@@ -142,13 +141,8 @@ class _Loops:
     def _misfit(self, matrix: OperatorMatrix, terms: NDArray, scale: float | None) -> NDArray[np.float64] | None:
         """(e,) of the conformal map; None where there is none."""
         weights = -self.without(matrix, terms).entries[self.piece.edge_rows]
-        try:
-            mesh = positions(self.piece, weights, scale=scale, sharp=False)
-        except (GeometryError, SolverError):
-            return None
-        with np.errstate(all="ignore"):
-            misfit = weights / mesh.scale - edge_weights(self.piece, mesh.z)
-        return misfit if np.isfinite(misfit).all() else None
+        found = left_by_map(self.piece, weights, scale)
+        return found[1] if found is not None and np.isfinite(found[1]).all() else None
 
     def without(self, matrix: OperatorMatrix, terms: NDArray) -> OperatorMatrix:
         """The matrix less these terms."""

@@ -52,7 +52,7 @@ def _rings(graph: Graph) -> NDArray[np.int64]:
     sides = graph.col[graph.start[middle][:, None] + np.arange(4)]
     pairs = sum(graph.coupled(sides[:, a], sides[:, b]).astype(int) for a, b in combinations(range(4), 2))
     middle, sides = middle[pairs % 2 == 0], sides[pairs % 2 == 0]
-    open_graph = graph.closed() - sp.eye_array(graph.n, dtype=np.int32, format="csr")
+    open_graph = graph.closed - sp.eye_array(graph.n, dtype=np.int32, format="csr")
     several = sp.csr_array(sum(open_graph[column] for column in sides.T))
     several.data = (several.data == 2).astype(np.int32)
     several.eliminate_zeros()

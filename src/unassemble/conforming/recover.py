@@ -101,8 +101,8 @@ def shown_cells(
     )
     for sets in node_sets(near, None if lost is None else lost[order]):
         with suppress(TopologyError):
-            for blocks, told in ordered_cells(near, sets, mass=mass, lost=lost is not None):
-                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
+            blocks, told = ordered_cells(near, sets, mass=mass, lost=lost is not None)
+            yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:

@@ -13,7 +13,6 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import SAMPLE
 from ..elements.kinds import KINDS, Kind
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
@@ -24,7 +23,6 @@ from .sets import NodeSets, pairs_of
 
 _KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 10: "triangle10"}
 _RINGS = {3: ((0, 1, 2),), 4: ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))}
-_DOUBTFUL = 4  # quadrilaterals whose sides are tried both ways
 _MOST = 6  # rows of a cell whose sides only entries tell
 
 
@@ -36,15 +34,6 @@ class Cells:
     told: bool  # whether the graph alone tells them, and no entries
     order: NDArray[np.int64]  # (n,) all rows, those near each other on the mesh near each other, too
     even: bool = False  # whether those that come next are as likely
-
-
-@dataclass(frozen=True, eq=False)
-class _Second:
-    """Cells that could be in another order: which, the second likeliest one, and how near it comes, 1 for as near."""
-
-    which: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    likeness: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +49,11 @@ class _Sides:
 
 def ordered_cells(
     matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False, lost: bool = False
-) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
-    """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
+) -> tuple[dict[Kind, NDArray[np.int64]], bool]:
+    """The likeliest cells of sets of rows, and whether the graph alone tells them.
 
-    With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal, nor where cells
-    are lost; of rows that were replaced it says nothing.
+    With a mass term nothing else stands on the diagonal, nor where cells are lost; of rows that were replaced it says
+    nothing.
 
     Raises TopologyError if the sets do not overlap as cells do.
     """
@@ -75,24 +64,14 @@ def ordered_cells(
     sides = _sides_between(matrix.n, found, size)
     every = np.sort(np.concatenate([pairs_of(matrix.n, sets).ravel() for sets in found.sets]))
     blocks: dict[Kind, NDArray[np.int64]] = {}
-    others: dict[Kind, _Second] = {}
-    first = 0
+    told, first = found.told, 0
     for sets in found.sets:
         kind = KINDS[_KINDS[sets.shape[1]]]
         per_cell = sides.per_cell[first : first + len(sets)]
-        blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
+        blocks[kind], by_graph = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
+        told = told and by_graph
         first += len(sets)
-    told = found.told and not any(len(other.which) for other in others.values())
-    yield blocks, told
-    for kind, other in others.items():
-        if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= SAMPLE:
-            doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
-            for turned in product((False, True), repeat=len(doubtful)):
-                if any(turned):
-                    some = doubtful[np.array(turned)]
-                    cells = blocks[kind].copy()
-                    cells[other.which[some]] = other.cells[some]
-                    yield blocks | {kind: cells}, told
+    return blocks, told
 
 
 def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:
@@ -136,10 +115,10 @@ def _ordered(
     every: NDArray[np.int64],
     *,
     mass: bool,
-) -> tuple[NDArray[np.int64], _Second]:
-    """Cells of one kind, and what else they could be."""
+) -> tuple[NDArray[np.int64], bool]:
+    """Cells of one kind, and whether the graph alone tells them."""
     corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
-    order, other = np.zeros(sets.shape, np.int64), np.zeros(sets.shape, np.int64)
+    order = np.zeros(sets.shape, np.int64)
     trials = list(_trials(matrix.n, kind, sets, sides, per_cell, (corners, inner, open_rows, n_open)))
     count = np.zeros(len(sets), np.int64)
     for some, trial in trials:
@@ -149,21 +128,15 @@ def _ordered(
         raise TopologyError(f"row {int(sets[np.argmin(count)][0])} is in a cell whose sides do not close")
     doubtful = np.flatnonzero(count > 1)
     entries = ElementEntries(matrix, sets[doubtful], every, mass=mass)
-    best, second = np.full((2, len(doubtful)), np.inf)
+    best = np.full(len(doubtful), np.inf)
     for some, trial in trials:
         several = count[some] > 1
         some, trial = some[several], trial[several]
         at = np.searchsorted(doubtful, some)
         misfit = entries.misfit(kind, at, trial)
-        better, close = misfit < best[at], misfit < second[at]
-        close &= ~better
-        second[at[better]], other[some[better]] = best[at[better]], order[some[better]]
+        better = misfit < best[at]
         best[at[better]], order[some[better]] = misfit[better], trial[better]
-        second[at[close]], other[some[close]] = misfit[close], trial[close]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        likeness = np.nan_to_num(best / second, nan=1.0)
-    left = _Second(doubtful, np.take_along_axis(sets, other, axis=1)[doubtful], likeness)
-    return np.take_along_axis(sets, order, axis=1), left
+    return np.take_along_axis(sets, order, axis=1), not len(doubtful)
 
 
 def _trials(

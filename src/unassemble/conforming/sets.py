@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import AT_ONCE, LARGE, SAMPLE
+from ..budget import LARGE, SAMPLE
 from ..elements.cliques import Graph, simplices
 from ..elements.surface import among
 from ..matrix import OperatorMatrix
@@ -43,7 +43,7 @@ class Common:
         size = matrix.row_size[matrix.edges].min(axis=1)
         self.n = matrix.n
         self.keys = pair_keys(matrix.n, *matrix.edges.T)
-        self.graph = self._graph_of(self.keys)
+        self.graph = Graph.of(matrix.n, *matrix.edges.T)
         stored = np.abs(matrix.entries) > ROUNDED * size
         self.stored = self.keys[stored]
         self.asked = self.stored if lost is None else self.keys[stored & ~lost[matrix.edges].any(axis=1)]  # for a cell
@@ -51,34 +51,11 @@ class Common:
     @cached_property
     def nonzero(self) -> Graph:
         """Entries that are not zero."""
-        return self._graph_of(self.stored)
-
-    def _graph_of(self, keys: NDArray[np.int64]) -> Graph:
-        ends = np.concatenate([keys // self.n, keys % self.n]), np.concatenate([keys % self.n, keys // self.n])
-        return Graph(sp.csr_array((np.ones(2 * len(keys), np.int8), ends), shape=(self.n, self.n)))
-
-    @cached_property
-    def closed(self) -> sp.csr_array:
-        """Neighbours, and the row itself."""
-        return self.graph.closed()
-
-    @cached_property
-    def count(self) -> NDArray[np.int64]:
-        """(e,) of each entry, in the order of its key."""
-        closed = self.closed
-        work = np.cumsum(closed @ np.diff(closed.indptr).astype(np.int64))
-        found = []
-        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(AT_ONCE, work[-1], AT_ONCE))):
-            block = closed[rows]
-            common = sp.csr_array((block @ closed).multiply(block))
-            common.sort_indices()
-            row = np.repeat(rows, np.diff(common.indptr))
-            found.append(common.data[common.indices > row])
-        return np.concatenate(found).astype(np.int64)
+        return Graph.of(self.n, self.stored // self.n, self.stored % self.n)
 
     def sets(self, k: int) -> NDArray[np.int64]:
         """(m, k) rows that two of them have in common, nearly all coupled to each other."""
-        keys = self.keys[self.count == k]
+        keys = self.keys[self.graph.common == k]
         if len(keys) > LARGE and not len(self._in_common(keys[:: len(keys) // SAMPLE], k)):
             return np.empty((0, k), np.int64)
         return once(self._in_common(keys, k))
@@ -88,9 +65,7 @@ class Common:
         if not len(keys):
             return np.empty((0, k), np.int64)
         i, j = keys // self.n, keys % self.n
-        both = sp.csr_array(self.closed[i].multiply(self.closed[j]))
-        both.sort_indices()
-        rows = both.indices.reshape(-1, k).astype(np.int64)
+        rows = self.graph.in_common(i, j, k)
         # What two cells have left of which others are lost may have as many rows, some with few neighbours among them.
         rest = rows[(rows != i[:, None]) & (rows != j[:, None])].reshape(-1, k - 2)
         return rows[(self._absent(rest).sum(axis=1) <= 2 * _ABSENT[k]) & (2 * self._absent(rows) < k).all(axis=1)]
@@ -101,14 +76,14 @@ class Common:
         Entries between it and the corners vanish where all sides are straight, so that of the rows it is coupled to
         only two belong to another cell's; rows that have more among their neighbours are in its own.
         """
-        inside = np.flatnonzero(np.diff(self.closed.indptr) <= 10)
+        inside = np.flatnonzero(np.diff(self.graph.closed.indptr) <= 10)
         if len(inside) > LARGE and not len(self._near_three(inside[:: len(inside) // SAMPLE])):
             return np.empty((0, 10), np.int64)
         return once(self._near_three(inside))
 
     def _near_three(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m, 10) what has three of a row and its neighbours among its own, where these are ten."""
-        several = sp.csr_array(self.closed[rows].astype(np.int32) @ self.closed)
+        several = sp.csr_array(self.graph.closed[rows].astype(np.int32) @ self.graph.closed)
         several.data = (several.data > 2).astype(np.int32)
         several.eliminate_zeros()
         several.sort_indices()
@@ -125,14 +100,14 @@ class Common:
             keys = self.stored[~contains(distinct(pairs_of(self.n, found)), self.stored)]
             if not len(keys):
                 break
-            alone = self._graph_of(keys)
+            alone = Graph.of(self.n, keys // self.n, keys % self.n)
             if right_angles:  # paths of two edges, the node between in the second place
                 place, end = alone.spread(alone.col)
                 first = alone.row[place]
                 middle = np.column_stack([first, alone.col[place], end])[first < end]
             else:
                 middle = simplices(alone, 2)
-            several = sp.csr_array(sum(self.closed[column] for column in middle.T))
+            several = sp.csr_array(sum(self.graph.closed[column] for column in middle.T))
             several.data = (several.data >= 2).astype(np.int32)
             several.eliminate_zeros()
             several.sort_indices()
@@ -214,7 +189,7 @@ def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.in
     if not len(one):
         yield quads
         return
-    degree = np.diff(common.closed.indptr)[quads].sum(axis=1)
+    degree = np.diff(common.graph.closed.indptr)[quads].sum(axis=1)
     fewer = degree[one] <= degree[other]
     for choice in (fewer, ~fewer):
         yield np.delete(quads, np.where(choice, other, one), axis=0)
@@ -239,7 +214,7 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
     by_quad = keys.ravel()[order[place]] == pairs
     within = np.sort(halves, axis=None)
     known = np.sort(np.concatenate([within, label[triangles].sum(axis=1)]))
-    degree = np.diff(common.closed.indptr)
+    degree = np.diff(common.graph.closed.indptr)
     outline = np.zeros(len(triangles), dtype=bool)
     for k in range(3):
         for corner in range(4):

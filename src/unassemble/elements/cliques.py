@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..budget import AT_ONCE
 from ..tolerances import ALIKE
+from ..topology.keys import contains, runs
 
 
 class Graph:
@@ -29,24 +32,37 @@ class Graph:
 
     def coupled(self, i: NDArray, j: NDArray) -> NDArray[np.bool_]:
         """(k,) whether i and j are neighbours."""
-        if not len(self._key):
-            return np.zeros(np.shape(i), dtype=bool)
-        key = i * self.n + j
-        place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
-        return self._key[place] == key
+        return contains(self._key, i * self.n + j)
 
     def spread(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
         """All pairs of an entry of `nodes`, by its place, and a neighbour of it."""
-        count = self.start[nodes + 1] - self.start[nodes]
-        place = np.repeat(np.arange(len(nodes)), count)
-        offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        place, offset = runs(self.start[nodes + 1] - self.start[nodes])
         return place, self.col[self.start[nodes[place]] + offset]
 
+    @cached_property
     def closed(self) -> sp.csr_array:
         """Pattern of ones, with the diagonal."""
         own = np.arange(self.n)
         row, col = np.concatenate([self.row, own]), np.concatenate([self.col, own])
         return sp.csr_array((np.ones(len(row), np.int32), (row, col)), shape=(self.n, self.n))
+
+    @cached_property
+    def common(self) -> NDArray[np.int64]:
+        """(e,) how many neighbours two that are coupled have in common, both themselves included; i < j in order."""
+        work = np.cumsum(self.closed @ np.diff(self.closed.indptr).astype(np.int64))
+        found = [np.empty(0, np.int64)]
+        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(AT_ONCE, work[-1:].sum(), AT_ONCE))):
+            block = self.closed[rows]
+            common = sp.csr_array((block @ self.closed).multiply(block))
+            common.sort_indices()
+            found.append(common.data[common.indices > np.repeat(rows, np.diff(common.indptr))])
+        return np.concatenate(found).astype(np.int64)
+
+    def in_common(self, i: NDArray, j: NDArray, k: int) -> NDArray[np.int64]:
+        """(m, k) nodes, increasing, that are next to both of pairs, (m,) each, these included; there are as many."""
+        both = sp.csr_array(self.closed[i].multiply(self.closed[j]))
+        both.sort_indices()
+        return both.indices.reshape(-1, k).astype(np.int64)
 
     def cliques(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m,) whether all nodes of each of the sets (m, k) are coupled to each other."""
@@ -78,23 +94,11 @@ def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
     a box or the middles of opposite edges of a quadratic tetrahedron, share the nodes of that cell and no others; a
     node inside a cell has no others itself.
     """
-    closed = graph.closed()
-    degree = np.diff(closed.indptr)
-    work = np.cumsum(closed @ degree.astype(np.int64))
+    upper = graph.row < graph.col
+    i, j = graph.row[upper][graph.common == k], graph.col[upper][graph.common == k]
     found = np.empty((0, k), np.int64)
-    if not graph.n or degree.max() < k:
-        return found
-    for rows in np.split(np.arange(graph.n), np.searchsorted(work, np.arange(AT_ONCE, work[-1], AT_ONCE))):
-        if not len(rows):
-            continue
-        block = closed[rows]
-        common = sp.triu(sp.csr_array((block @ closed).multiply(block)), rows[0], format="coo")
-        pairs = common.data == k
-        i, j = rows[common.row[pairs]], common.col[pairs]
-        if len(i):
-            sets = sp.csr_array(closed[i].multiply(closed[j]))
-            sets.sort_indices()
-            found = np.unique(np.vstack([found, sets.indices.reshape(-1, k).astype(np.int64)]), axis=0)
+    for some in np.array_split(np.arange(len(i)), 1 + len(i) * k * k // AT_ONCE):
+        found = np.unique(np.vstack([found, graph.in_common(i[some], j[some], k)]), axis=0)
     return found[graph.cliques(found)]
 
 

@@ -19,8 +19,7 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import UpperTriangle, nearly_singular
 from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
-from ..planar.conformal import conformal_map
-from ..planar.cotangent import edge_weights
+from ..planar.piece import left_by_map
 from ..reaction import Skeleton
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, SUMMED
@@ -66,13 +65,8 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
     """Whether conformal maps fit the most entries off the diagonal, whatever stands on it."""
     for piece in topology.pieces:
         weights = -matrix.entries[piece.edge_rows]
-        try:
-            found = conformal_map(piece, weights, sharp=False)
-        except RecoveryError:
-            return False
-        with np.errstate(all="ignore"):
-            left = np.abs(weights - found.scale * edge_weights(piece, found.z))
-        if not np.median(left) <= ALIKE * np.median(np.abs(weights)):
+        found = left_by_map(piece, weights)
+        if not found or not np.median(np.abs(found[1] * found[0])) <= ALIKE * np.median(np.abs(weights)):
             return False
     return True
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverError
+from ..errors import GeometryError, SolverError
 from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from .conformal import conformal_map
@@ -31,6 +31,16 @@ def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: boo
     """Conformal solve; `sharp` where no polish follows."""
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     return PieceMesh(found.z, found.scale, () if found.converged else ("the conformal solve did not converge",))
+
+
+def left_by_map(piece: Piece, weights: NDArray, scale: float | None = None) -> tuple[float, NDArray[np.float64]] | None:
+    """c, and what the conformal map leaves of weights over c, (e,); None where there is no map."""
+    try:
+        mesh = positions(piece, weights, scale=scale, sharp=False)
+    except (GeometryError, SolverError):
+        return None
+    with np.errstate(all="ignore"):  # flat triangles
+        return mesh.scale, weights / mesh.scale - edge_weights(piece, mesh.z)
 
 
 def refined(

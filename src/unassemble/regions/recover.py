@@ -16,11 +16,9 @@ from ..boundaries.partial import distinct
 from ..boundaries.rim import Rim
 from ..budget import SAMPLE, Budget
 from ..clock import Clock
-from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.conformal import conformal_map
-from ..planar.cotangent import edge_weights
+from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..scalar.placement import Placement
 from .exchange import exchanges
@@ -69,15 +67,8 @@ def _with_regions(budget: Budget, given: Sequence[PieceEntries], _: float | None
 
 def _uniform(given: PieceEntries) -> bool:
     """Whether all entries are whole, and one factor comes near them, at the conformal map."""
-    if not given.whole.all():
-        return False
-    piece, weights = given.piece, given.weights
-    try:
-        found = conformal_map(piece, weights, scale=None, sharp=False)
-    except (GeometryError, SolverError):
-        return False
-    misfit = weights / found.scale - edge_weights(piece, found.z)
-    return bool(np.sqrt(np.mean(misfit**2)) < 1e-3)  # entries may have errors
+    found = left_by_map(given.piece, given.weights) if given.whole.all() else None
+    return found is not None and bool(np.sqrt(np.mean(found[1] ** 2)) < 1e-3)  # entries may have errors
 
 
 def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray, budget: Budget) -> InsideMesh | None:

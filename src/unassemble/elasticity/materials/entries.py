@@ -77,7 +77,7 @@ class Entries:
             return None
         complete = self.complete.copy()
         complete[i[outside]] = complete[j[outside]] = False
-        closed = graph.closed()
+        closed = graph.closed
         complete[closed[i[outside]].multiply(closed[j[outside]]).nonzero()[1]] = False
         return replace(self.at(np.flatnonzero(complete[i] | complete[j])), complete=complete)
 
