@@ -80,7 +80,7 @@ def misplaced(x: NDArray, y: NDArray) -> float:
 
 
 def gives_back(found, matrix: Any) -> bool:
-    """Whether elements on the cells, one factor in each piece, give the entries of determined rows."""
+    """Whether elements on the cells, one factor in each piece or region, give the entries of determined rows."""
     linear = not isinstance(found, ConformingMesh)
     cells = {"triangle": found.divided()[0]} if linear else found.cells
     if not any(map(len, cells.values())) or not all(np.isfinite(found.points[some]).all() for some in cells.values()):
@@ -89,9 +89,11 @@ def gives_back(found, matrix: Any) -> bool:
     off = given / max(np.abs(given).max(), 1e-300)
     off = sp.csr_array(off - sp.diags_array(off.diagonal()))
     total = sp.csr_array(off.shape)
-    for part in pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells):
+    parts = pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells)
+    for k, part in enumerate(parts):
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
-        total = total + part * ratio(part, off)
+        shared = found.region is not None  # entries of two regions have a part of each
+        total = total + part * (found.scale[k] / max(np.abs(given).max(), 1e-300) if shared else ratio(part, off))
     size = np.maximum(np.abs(given).max(axis=1).toarray().ravel(), 1e-300)
     lost = (np.abs(given.sum(axis=1)) > MISFIT * size) & (getattr(found, "n_entries", 1) == 0)  # else all are claimed
     return agree(off, total, found.node_status == 0, cells, lost)
@@ -151,8 +153,8 @@ def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
 
 
 def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
-    """The matrix of each piece of a mesh of linear triangles."""
-    label = pieces_of(triangles)
+    """The matrix of each piece, or of each region, of a mesh of linear triangles."""
+    label = pieces_of(triangles) if found.region is None else found.region
     for k in range(label.max() + 1):
         yield assembled_on("triangle", triangles[label == k], found, laplace)
 
@@ -211,7 +213,7 @@ def judged(given: Given) -> str:
         return "right" if lengths_give_back(found, sp.csr_array(given.matrix, dtype=np.float64)) else "WRONG"
     right = given.pieces is not None and positions_agree(found, given.pieces)
     if not hasattr(found, "divided"):  # bodies and structures
-        return "right" if right else "WRONG"
+        return "right" if right else "ambiguous" if found.uniqueness == "ambiguous" else "WRONG"
     matrix = sp.csr_array(given.matrix)
     if found.areas is not None:
         return "right" if areas_give_back(found, matrix) else "WRONG"

@@ -27,6 +27,7 @@ def test_no_traceback_and_no_wrong_certificate(kind):
         assert outcome not in ("WRONG", "CRASH", "SLOW"), f"--kinds {kind} --first {k}\n{said}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["damaged", "glued", "hopeless"])
 def test_the_same_of_what_takes_longer(kind):
     _, _, outcome, _, said = tried(0, 0, (kind,))
@@ -132,6 +133,7 @@ def test_dense_matrices_are_refused_at_once():
     assert time.process_time() - start < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "share"), [(370, 1.0), (1000, 0.15), (1000, 0.005)])
 def test_random_matrices_of_many_entries_are_refused_soon(n, share):
     """As many entries as elements may have, and far more 3-cycles."""

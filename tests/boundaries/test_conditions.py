@@ -244,6 +244,7 @@ def test_shuffled_keeps_zeros():
     assert shuffled(matrix, np.zeros((matrix.shape[0], 2)))[0].nnz == matrix.nnz
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_slivers_at_the_rim(seed):
     """What is called determined is right, whatever the rim is like."""

@@ -101,6 +101,7 @@ def test_third_party_boundaries_that_were_taken_out(name, outside):
     assert beside(given, (1.0, 5.0), outside) >= 0.85
 
 
+@pytest.mark.slow
 def test_a_wrong_entry_beside_a_boundary_that_was_taken_out():
     matrix, _ = materials(jittered(4), (1.0, 5.0), outside=condense)
     wrong = matrix.tolil()
@@ -139,6 +140,7 @@ def certified(matrix):
         return False
 
 
+@pytest.mark.slow
 def test_a_wrong_entry_is_not_explained():
     matrix, _ = materials(jittered(3), (1.0, 5.0))
     pairs = sp.coo_array(sp.triu(matrix, 1))

@@ -6,7 +6,7 @@ import pytest
 from families import FAMILIES
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.propagate import ContradictionError, lone_scales, peeled
+from unassemble.cells.propagate import ContradictionError, lone_scales, told
 from unassemble.topology import three_cycles
 from vanishing import forgotten
 
@@ -34,7 +34,7 @@ def lattice(seed, c=1.0):
 def test_what_is_peeled_is_right(seed, c):
     sides, weights, true = cycles_of(lattice(seed, c))
     assert list(lone_scales(sides, weights)) == [pytest.approx(c, rel=1e-9)]
-    state = peeled(sides, 2 * weights / c)
+    state = told(sides, 2 * weights / c)
     assert true[state == 1].all()
     assert not true[state == -1].any()
     assert (state == 1).sum() > 0.6 * true.sum()
@@ -44,7 +44,7 @@ def test_a_wrong_scale_is_contradicted():
     sides, weights, _ = cycles_of(lattice(13))
     for wrong in (0.7, 1.3, 2.0):
         with pytest.raises(ContradictionError):
-            peeled(sides, 2 * weights / wrong)
+            told(sides, 2 * weights / wrong)
 
 
 def test_random_weights_agree_in_no_scale():
@@ -55,7 +55,7 @@ def test_random_weights_agree_in_no_scale():
 def test_a_right_angle_across_an_inner_edge():
     """Taken for a cell because of its other sides, a triangle may have no part in the weight of the third."""
     cotangents = np.array([1.0, 1.0, 2.0, 0.5, 0.0])
-    state = peeled(np.array([[0, 1, 4], [2, 3, 4]]), cotangents)
+    state = told(np.array([[0, 1, 4], [2, 3, 4]]), cotangents)
     assert state.tolist() == [1, 1]
 
 

@@ -103,6 +103,7 @@ UNCERTIFIED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("debug", [False, True])
 @pytest.mark.parametrize("name", UNCERTIFIED)
 def test_3_each_error_is_named_as_absolute_or_relative(work, name, debug):

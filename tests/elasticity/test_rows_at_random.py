@@ -4,6 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from assembled import box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import SUPPORTS, assert_certified, given, judged
 
@@ -72,3 +73,15 @@ def test_the_pieces_of_a_body_are_read_one_by_one():
     assert found.certified
     assert len(found.evidence) == 2
     assert not found.node_status.any()
+
+
+def test_a_single_element_is_ambiguous():
+    """The rows along y of a square, paired with those of opposite corners, are those of its mirror image."""
+    case = stiffness("quad-q1", box("quad-q1", (2, 2)))
+    matrix = sp.csr_array(case.matrix)
+    across = [int(np.argmin(np.linalg.norm(case.points - 1 + point, axis=1))) for point in case.points]
+    for rows in (2 * np.arange(4) + 1, 2 * np.array(across) + 1):
+        order = np.concatenate([2 * np.arange(4), rows])
+        found = recover_elasticity(matrix[order][:, order])
+        assert found.certified
+        assert found.uniqueness == "ambiguous"

@@ -7,7 +7,6 @@ import io
 import h5py
 import numpy as np
 import pytest
-import scipy.io
 import scipy.sparse as sp
 
 from meshes import random_mesh, specimen
@@ -61,13 +60,6 @@ def test_dense_arrays_are_never_unpickled(tmp_path):
     np.save(tmp_path / "A.npy", np.array([[None]]), allow_pickle=True)
     with pytest.raises(MatrixFileError, match="Object arrays"):
         read_matrix(tmp_path / "A.npy")
-
-
-@pytest.mark.parametrize("dense", [False, True])
-def test_matlab_4(tmp_path, dense):
-    matrix = TRUE.matrix.toarray() if dense else TRUE.matrix.tocsc()
-    scipy.io.savemat(tmp_path / "A.mat", {"A": matrix, "x": np.ones(3)}, format="4")
-    same(read_matrix(tmp_path / "A.mat"))
 
 
 def test_matlab_73():

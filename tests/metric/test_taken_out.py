@@ -38,6 +38,7 @@ def test_vertices_apart_from_each_other(mesh):
     assert recover(matrix, operator="surface", scale=-0.7).certified
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_several_in_one_hole_are_never_certified(seed):
     """One vertex in the place of two or three has lengths mostly, with another c: they are wrong."""

@@ -44,6 +44,7 @@ def surface_matrix(points, triangles):
     return sp.coo_array(entries, shape=(len(points),) * 2).tocsr()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relative", [1e-8, 1e-2])
 @pytest.mark.parametrize(("edge", "options"), [*((10, some) for some in OPTIONS[:3]), (200, OPTIONS[0])], ids=str)
 def test_one_entry_changed(options, relative, edge):
@@ -78,6 +79,7 @@ def redundancy():
 CHECKED = np.flatnonzero(redundancy() > 0.2)  # errors of the others hide in the position of a vertex
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, derandomize=True)
 @given(edge=st.sampled_from(CHECKED.tolist()), exponent=st.floats(-7.5, -0.5), sign=st.sampled_from([-1, 1]))
 def test_any_entry_changed_by_any_amount(edge, exponent, sign):
@@ -124,6 +126,7 @@ def test_hole_filled_with_wrong_weights(options):
     assert {int(i) for i in found.worst_entries[:3].ravel()} & set(hole.tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"noise": 1e-6}, {"refine": False}], ids=str)
 @pytest.mark.parametrize("height", [1e-2, 0.4])
 def test_curved_surface(options, height):
@@ -170,6 +173,7 @@ def test_another_mesh_on_the_same_graph_is_certified_as_that_mesh():
             assert len(found.worst_entries)
 
 
+@pytest.mark.slow
 def test_single_wrong_entry_does_not_drown_in_a_large_sum():
     """With thousands of degrees of freedom the chi-square test alone would let it pass."""
     known = specimen(*random_mesh(4000, seed=1))

@@ -90,6 +90,7 @@ def test_noise_beside_another_term_is_not_certified_either():
     assert found.status != "certified" or found.reaction, found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_itself_is_still_told_and_certified(seed):
     A, sigma = shuffled(laplace.assemble(disc())), 1e-5

@@ -208,6 +208,7 @@ def test_isolated_rows_have_no_position():
     assert any("no position" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_changed_entry_is_found_and_named():
     known = specimen(*random_mesh(400))
     matrix = known.matrix.copy()

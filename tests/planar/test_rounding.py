@@ -22,6 +22,7 @@ def rounded(matrix, form):
 NAMES = {"single": "single precision", "%.6g": "6 digits", "%.4g": "4 digits", "%.3g": "3 digits", "%.6f": "6 decimals"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", NAMES)
 def test_rounded_entries_are_tested_against_their_rounding(form):
     known = specimen(*random_mesh(400, seed=1), c=1.7)
@@ -90,6 +91,7 @@ def test_whole_entries_of_no_mesh_are_not_excused():
     assert found.chi_square is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["single", "%.6g", "%.4g"])
 def test_rounding_does_not_excuse_a_wrong_entry(form):
     known = specimen(*random_mesh(400, seed=1))
@@ -116,6 +118,7 @@ def test_other_errors_are_estimated_though_entries_are_rounded():
     assert largest_error(found.points, told.points) < 0.1 * largest_error(told.points, known.points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["%.3g", "%.4g", "%.6g"])
 def test_weights_of_no_mesh_are_not_certified(form):
     rng = np.random.default_rng(3)

@@ -194,6 +194,7 @@ def test_scaled_unknowns(c, jacobi):
     assert found.scale[0] == pytest.approx(c * mean**2, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_scaled_unknowns_with_a_diagonal_are_not_determined():
     points, triangles = random_mesh(100, seed=11)
     matrix, _, _ = assembled(points, triangles, 1.0, 0.0)

@@ -14,7 +14,6 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..conforming.joined import JoinedParts
 from ..conforming.parts import Part, parts_of
@@ -80,27 +79,16 @@ def _report(
     matrix: OperatorMatrix, fits: list[FittedPart], placement: Placement, clock: Clock, options: ScalarOptions
 ) -> ConformingMesh | None:
     """The mesh, if it is certified."""
-    parts = [fit.part for fit in fits]
-    topology = Topology(matrix.n, matrix.edges, tuple(part.piece for part in parts), "cliques")
-    told = [(part.piece.vertices, fit.known_nodes) for part, fit in zip(parts, fits, strict=True)]
+    own = [fit.fit for fit in fits]
+    topology = Topology(matrix.n, matrix.edges, tuple(one.part.piece for one in own), "cliques")
+    told = [(fit.fit.part.piece.vertices, fit.known_nodes) for fit in fits]
     placement, said = placement.upon(matrix.n, told)
     with clock("place"):
-        nodes = [fit.entries.nodes(fit.z) for fit in fits]
-        placed, origins, notes = placement.placed(topology, nodes, [() for _ in fits])
-        mesh = JoinedParts(parts, placed, matrix.n)
-        shift = origins[mesh.component]
-        points = mesh.points + np.column_stack([shift.real, shift.imag])
+        mesh = JoinedParts(topology, own, placement)
     status = node_status(mesh.component, told)
-    scale, tensor = np.array([fit.scale for fit in fits]), placement.tensor
     with clock("certify"):
-        drawn = points
-        if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
-            z = tensor.to_laplacian(points @ [1, 1j])
-            drawn = np.column_stack([z.real, z.imag])
-        rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
-        factors = {name: scale[piece] for name, piece in mesh.piece.items()}
-        found = certify_elements(matrix.edges, matrix.entries, np.nan_to_num(drawn), mesh.blocks, factors, rules)
-        pairs = np.concatenate([fit.part.rows[fit.judged] for fit in fits])
+        found = mesh.held(matrix, np.nan_to_num(mesh.written))
+        pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
         free = 1 if options.scale is None else 0
@@ -109,17 +97,13 @@ def _report(
     if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None
     known, plausible = int((status == 0).sum()), int((status == 2).sum())
-    notes = [*matrix.warnings, *said, *notes]
+    notes = [*matrix.warnings, *said, *mesh.notes]
     if plausible:
         notes.append(f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2)")
     if options.standard_deviations:
         notes.append("error bars are not computed where cells of these elements are lost")
     return ConformingMesh(
-        points=points,
         **mesh.fields(),
-        component=mesh.component,
-        hinges=topology.hinges,
-        scale=scale / (tensor.root_determinant if tensor else 1.0),
         node_status=status,
         status="certified",
         uniqueness="searched",
@@ -129,9 +113,6 @@ def _report(
         ),
         operator=placement.operator,
         backward_error=error,
-        n_holes=sum(part.n_holes for part in parts),
         timings=clock.timings,
         warnings=tuple(notes),
-        quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
-        straight=True,
     )

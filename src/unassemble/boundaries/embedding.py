@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..linalg import UpperTriangle, factorisation
+from ..planar.cotangent import areas
 from ..topology import Piece
 
 
@@ -54,9 +55,3 @@ def relaxed(edges: NDArray, z: NDArray[np.complex128], free: NDArray[np.bool_]) 
         z[free] = np.ascontiguousarray(solver.solve(np.column_stack([pull.real, pull.imag]))) @ np.array([1, 1j])
         solver.release()
     return z
-
-
-def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
-    """(m,) twice the areas of triangles."""
-    a, b, c = z[piece.triangles].T
-    return np.asarray((np.conj(b - a) * (c - a)).imag)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
+from ..planar.cotangent import areas
 from ..topology import Piece
-from .embedding import areas, tutte
+from .embedding import tutte
 from .fit import Fit, FitOptions, WholeEntries
 from .patch import distance, fit_near
 from .rim import Rim

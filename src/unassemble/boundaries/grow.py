@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..planar.cotangent import weight_roundings
+from ..planar.cotangent import areas, weight_roundings
 from ..tolerances import CERTIFIED
 from ..topology import Piece
-from .embedding import areas
 from .fit import Scale, WholeEntries
 from .patch import Patch, fit_near
 

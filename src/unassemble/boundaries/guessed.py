@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..conforming.affine import expected
-from ..conforming.assembly import Entries
-from ..conforming.fit import corner_positions, entries_by_rule
+from ..conforming.fit import Fitted, by_rule, corner_positions
 from ..conforming.parts import Part
 from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
@@ -28,11 +27,7 @@ _TO_THE_END = PolishOptions(settled=0.0)  # misfits of guesses are no noise
 class FittedPart:
     """A part whose whole entries fit."""
 
-    part: Part
-    entries: Entries
-    rule: dict[str, str]
-    z: NDArray[np.complex128]  # (corners,)
-    scale: float
+    fit: Fitted
     known: NDArray[np.bool_]  # (corners,) that are determined
     whole: NDArray[np.bool_]  # (e,) pairs of the part
     used: NDArray[np.bool_]  # (e,) that determine and check what is known
@@ -41,14 +36,14 @@ class FittedPart:
     @property
     def known_nodes(self) -> NDArray[np.bool_]:
         """(n,) nodes between known corners that are told from each other."""
-        return np.asarray((self.part.from_corners() @ ~self.known == 0) & ~self.twins)
+        return np.asarray((self.fit.part.from_corners() @ ~self.known == 0) & ~self.twins)
 
     @property
     def judged(self) -> NDArray[np.bool_]:
         """(e,) whole entries of cells whose corners are all known."""
         loose = np.zeros(len(self.whole), dtype=bool)
-        for kind, cells in self.part.blocks.items():
-            loose[self.part.places[kind][~self.known[cells[:, : kind.corners]].all(axis=1)]] = True
+        for kind, cells in self.fit.part.blocks.items():
+            loose[self.fit.part.places[kind][~self.known[cells[:, : kind.corners]].all(axis=1)]] = True
         return self.whole & ~loose
 
 
@@ -71,12 +66,12 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
             start, c = corner_positions(part, guess, None)  # the energy of guesses is not that of c
         except (GeometryError, SolverError):
             continue
-        rules = list(entries_by_rule(part))  # much alike: which it is shows near the end
-        begun = _faded(_Guessed(rules[0][1], guess, whole, start, c, np.inf), _AT_FIRST, scale)
-        trials = [(_faded(replace(begun, entries=entries), _THEN[:1], scale), rule) for rule, entries in rules]
-        for near_end, rule in sorted(trials, key=lambda one: one[0].misfit)[:2]:
-            fit = _faded(near_end, _THEN, scale)
-            if not fit.misfit <= EXACT or fit.entries.flipped(fit.z):
+        rules = list(by_rule(part, guess, start, c))  # much alike: which it is shows near the end
+        begun = _faded(rules[0], whole, _AT_FIRST, scale)
+        trials = [_faded(replace(begun, entries=one.entries, rule=one.rule), whole, _THEN[:1], scale) for one in rules]
+        for near_end in sorted(trials, key=lambda one: _size(one, whole))[:2]:
+            fit = _faded(near_end, whole, _THEN, scale)
+            if not _size(fit, whole) <= EXACT or fit.entries.flipped(fit.z):
                 continue
             w = fit.entries.weights(fit.z)
             jacobian = fit.entries.jacobian(fit.z, np.ones(len(w))).matrix
@@ -84,7 +79,7 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
             known, used = determined_by(jacobian, slopes, whole, fit.z, part.piece)
             twins = _twins(part, weights / fit.scale, whole, near[part.piece.vertices])
             known &= ~twins[: part.n_corners]
-            return FittedPart(part, fit.entries, rule, fit.z, fit.scale, known, whole, used, twins)
+            return FittedPart(fit, known, whole, used, twins)
     return None
 
 
@@ -109,31 +104,23 @@ def _twins(part: Part, weights: NDArray, whole: NDArray[np.bool_], near: NDArray
     return twins
 
 
-@dataclass(frozen=True, eq=False)
-class _Guessed:
-    """Positions fitted to whole entries and, as these do not tell all, to guesses of the others."""
-
-    entries: Entries
-    weights: NDArray[np.float64]  # (e,) given or guessed
-    whole: NDArray[np.bool_]  # (e,) those that are given
-    z: NDArray[np.complex128]
-    scale: float
-    misfit: float  # root mean square over whole entries, relative to c
+def _size(fit: Fitted, whole: NDArray[np.bool_]) -> float:
+    """Root mean square misfit of whole entries, relative to c."""
+    return float(np.sqrt(np.mean((fit.misfit / fit.scale)[whole] ** 2)))
 
 
-def _faded(start: _Guessed, fading: Sequence[float], scale: float | None) -> _Guessed:
+def _faded(start: Fitted, whole: NDArray[np.bool_], fading: Sequence[float], scale: float | None) -> Fitted:
     """One fit after the other, with such weights of what is guessed; small ones only hold the mesh where it is."""
     fit = start
     for weight in fading:
-        spread = np.where(fit.whole, 1.0, 1 / weight)
+        spread = np.where(whole, 1.0, 1 / weight)
         try:
             found = polish(fit.entries, fit.weights, fit.z, scale=scale, spread=spread, options=_TO_THE_END)
         except SolverError:
             break
-        own = fit.entries.weights(found.z)
-        misfit = float(np.sqrt(np.mean((fit.weights / found.scale - own)[fit.whole] ** 2)))
-        if not np.isfinite(misfit) or (weight == _THEN[-1] and misfit > fit.misfit / 2):
+        own = found.scale * fit.entries.weights(found.z)
+        new = replace(fit, z=found.z, scale=found.scale, misfit=fit.weights - own)
+        if not np.isfinite(_size(new, whole)) or (weight == _THEN[-1] and _size(new, whole) > _size(fit, whole) / 2):
             break
-        weights = np.where(fit.whole, fit.weights, found.scale * own) if weight <= SMALL else fit.weights
-        fit = replace(fit, weights=weights, z=found.z, scale=found.scale, misfit=misfit)
+        fit = replace(new, weights=np.where(whole, fit.weights, own)) if weight <= SMALL else new
     return fit

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED
+from ..tolerances import CERTIFIED, ROUNDED
+from ..topology.keys import found, pair_keys
 from .grid import Grid
+from .rectangles import steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,45 +58,72 @@ class Lattice:
     """Cells on rows of a matrix, and on vertices that it lacks."""
 
     neighbours: int  # of a row inside, see :class:`.grid.Grid`; eight where cells are bilinear
+    rectangles: bool  # of different sizes; other cells are all alike
     scale: float  # c
     z: NDArray[np.complex128]  # (n + g,) positions of the rows, then of the vertices that are gone
     cells: NDArray[np.int64]  # (m, 3 or 4) all of them, counter-clockwise
-    shift: float  # the multiple of the identity that rows inside have besides
+    beyond: sp.csr_array  # (n, g) entries that rows had in columns that are gone
+    added: NDArray[np.float64]  # (n,) what diagonal entries have besides: a multiple of the area of the cells at a row
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:
-        """The lattice that a matrix may belong to; None where its graph is no grid, or rows inside differ."""
-        grid = Grid.of(matrix.n, matrix.edges)
-        if grid is None:
+        """The lattice that a matrix may belong to; None where its graph is no grid, or no shapes of cells fit."""
+        vanished = np.abs(matrix.entries) <= ROUNDED * matrix.row_size[matrix.edges].min(axis=1)
+        bare = matrix.without(vanished)
+        grid = Grid.of(matrix.n, bare.edges)
+        if grid is not None:
+            matrix = bare
+        elif not vanished.any() or (grid := Grid.of(matrix.n, matrix.edges)) is None:
             return None
         kind = _KINDS[grid.neighbours]
-        whole = np.array([np.median(matrix.entries[grid.step == d]) for d in range(len(kind.stencil))])
-        metric = np.linalg.lstsq(kind.stencil, whole, rcond=None)[0]
-        xx, yy, xy = metric.tolist()
-        if not xx * yy > xy**2 or (np.abs(kind.stencil @ metric - whole) > CERTIFIED * np.abs(whole).max()).any():
-            return None
-        scale = float(np.sign(xx) * np.sqrt(xx * yy - xy**2))
         at, cells = _around(grid, kind)
-        present, shift = _present(matrix, kind, whole, cells)
-        used = np.arange(len(at)) < matrix.n
+        rectangles = _rectangles(matrix, grid, at, cells)
+        shapes = rectangles or _alike(matrix, grid, at, cells)
+        if shapes is None:
+            return None
+        scale, z, form = shapes
+        a, b, c = z[cells[:, :3]].T
+        parts = form @ (kind.stencil / np.array(kind.sharing)[:, None]).T
+        present, added = _present(matrix, kind, parts, np.abs((np.conj(b - a) * (c - a)).imag), cells)
+        n, used = matrix.n, np.arange(len(at)) < matrix.n
         used[cells[present]] = True
-        number = np.cumsum(used) - 1
-        z = at[used] @ np.array([1, (-xy + 1j * scale) / yy])
-        return cls(grid.neighbours, scale, z, number[cells[present]], shift)
+        cells, parts = (np.cumsum(used) - 1)[cells[present]], parts[present]
+        one, other, which = np.array([*kind.pairs, *((q, p, d) for p, q, d in kind.pairs)]).T
+        row, column = cells[:, one], cells[:, other] - n
+        out = (row < n) & (column >= 0)
+        beyond = sp.coo_array((parts[:, which][out], (row[out], column[out])), shape=(n, int(used.sum()) - n))
+        return cls(grid.neighbours, rectangles is not None, scale, z[used], cells, beyond.tocsr(), added)
 
 
-def rows_alike(matrix: OperatorMatrix) -> bool:
-    """Whether most rows with all their neighbours have entries of the same size, and some rows do not add up to zero.
+def _rectangles(
+    matrix: OperatorMatrix, grid: Grid, at: NDArray[np.int64], cells: NDArray[np.int64]
+) -> tuple[float, NDArray[np.complex128], NDArray[np.float64]] | None:
+    """c, positions (k,), and (G11, G22, G12) of each cell, (m, 3), of a grid of rectangles; None where it is none."""
+    sizes = None if grid.neighbours == 6 else steps(matrix, grid, cells[(cells < matrix.n).all(axis=1)])
+    if sizes is None:
+        return None
+    scale, x, y = sizes
+    column, row = (at - at.min(axis=0)).T
+    z = np.append(0.0, np.cumsum(x))[column] + 1j * np.append(0.0, np.cumsum(y))[row]
+    ratio = y[row[cells[:, 0]]] / x[column[cells[:, 0]]]
+    return scale, z, scale * np.column_stack([ratio, 1 / ratio, np.zeros(len(ratio))])
 
-    Next to no work, and no other matrix is a lattice that has lost rows.
-    """
-    size, sums = np.zeros(matrix.n), matrix.row_sums
-    for end in matrix.edges.T:
-        size += np.bincount(end, np.abs(matrix.entries), matrix.n)
-    degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
-    inside = size[degree == degree.max()]
-    alike = np.abs(inside - np.median(inside)) <= CERTIFIED * np.median(inside)
-    return bool(2 * np.count_nonzero(alike) >= len(alike) and (np.abs(sums) > CERTIFIED * size).any())
+
+def _alike(
+    matrix: OperatorMatrix, grid: Grid, at: NDArray[np.int64], cells: NDArray[np.int64]
+) -> tuple[float, NDArray[np.complex128], NDArray[np.float64]] | None:
+    """c, positions (k,), and (G11, G22, G12) of each cell, (m, 3), where all are alike; None where they are not."""
+    kind = _KINDS[grid.neighbours]
+    whole = np.array([np.median(matrix.entries[grid.step == d]) for d in range(len(kind.stencil))])
+    tolerance = CERTIFIED * np.abs(whole).max()
+    if 2 * np.count_nonzero(np.abs(matrix.entries - whole[grid.step]) <= tolerance) < len(grid.step):
+        return None
+    form = np.linalg.lstsq(kind.stencil, whole, rcond=None)[0]
+    xx, yy, xy = form.tolist()
+    if not xx * yy > xy**2 or (np.abs(kind.stencil @ form - whole) > tolerance).any():
+        return None
+    scale = float(np.sign(xx) * np.sqrt(xx * yy - xy**2))
+    return scale, at @ np.array([1, (-xy + 1j * scale) / yy]), np.broadcast_to(form, (len(cells), 3))
 
 
 def _around(grid: Grid, kind: _Kind) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -114,43 +144,54 @@ def _around(grid: Grid, kind: _Kind) -> tuple[NDArray[np.int64], NDArray[np.int6
     return np.concatenate([grid.at, at[gone][first]]), cells
 
 
-def _present(matrix: OperatorMatrix, kind: _Kind, whole: NDArray, cells: NDArray) -> tuple[NDArray[np.bool_], float]:
-    """Which cells there are, and the multiple of the identity that rows inside have besides.
+def _present(
+    matrix: OperatorMatrix, kind: _Kind, parts: NDArray, area: NDArray, cells: NDArray
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Which cells there are, and what diagonal entries have besides, (n,): a multiple of a lumped mass matrix.
 
+    Cells add `parts`, (m, directions), to the entries of their edges, and have `area`, (m,), up to a common factor.
     Where an entry is that of one cell only it is the one with more rows. Cells of a single row show in its diagonal
     entry.
     """
     n, own = matrix.n, cells < matrix.n
     rows, key = own.sum(axis=1), matrix.edges @ [n, 1]
+    tolerance = CERTIFIED * matrix.row_size
     present = np.zeros(len(cells), dtype=bool)
     diagonal = np.zeros(cells.shape)  # what each cell has of the diagonal entries of its corners
-    on_edge = np.zeros(len(key))  # rows of all cells there
+    on_edge, both = np.zeros(len(key)), np.zeros(len(key))  # rows of all cells there, and what they add
     ends = []
     for p, q, d in kind.pairs:
-        part = whole[d] / kind.sharing[d]
-        diagonal[:, [p, q]] -= part
+        diagonal[:, [p, q]] -= parts[:, [d]]
         some = np.flatnonzero(own[:, p] & own[:, q])
-        edge = np.searchsorted(key, np.sort(cells[some][:, [p, q]], axis=1) @ [n, 1]).clip(max=len(key) - 1)
+        edge, stored = found(key, pair_keys(n, cells[some, p], cells[some, q]))
+        some, edge = some[stored], edge[stored]
         on_edge += np.bincount(edge, rows[some], len(key))
-        if abs(part) > CERTIFIED * np.abs(whole).max():
-            ends.append((some, edge, np.rint(matrix.entries[edge] / part), kind.sharing[d]))
-    for some, edge, count, sharing in ends:
-        present[some] |= (count == sharing) | ((count == 1) & (2 * rows[some] > on_edge[edge]))
+        both += np.bincount(edge, parts[some, d], len(key))
+        ends.append((some, edge, parts[some, d]))
+    for some, edge, part in ends:
+        entry, near = matrix.entries[edge], tolerance[matrix.edges[edge]].min(axis=1)
+        alone = (np.abs(entry - part) <= near) & (2 * rows[some] > on_edge[edge])
+        present[some] |= (alone | (np.abs(entry - both[edge]) <= near)) & (np.abs(part) > near)
     alone = ~present & (rows == 1)
     missing = np.bincount(cells[~present][own[~present]], minlength=n) > 0
     rest = matrix.diagonal - _sums(cells, diagonal, present, n)
-    shift = float(np.median(rest[~missing])) if not missing.all() else 0.0
-    shift = shift if abs(shift) > CERTIFIED * np.abs(whole).max() else 0.0
-    rest, tolerance = rest - shift, CERTIFIED * np.abs(whole).max()
+    mass = np.broadcast_to(area[:, None], cells.shape)
+    inside = _sums(cells, mass, present, n)
+    density = np.median((rest / inside)[~missing]) if not missing.all() else 0.0
+    if (np.abs(density * inside) > tolerance)[~missing].any():
+        diagonal += density * mass
+        rest -= density * inside
+    else:
+        density = 0.0
     present[alone] = (np.abs(rest - _sums(cells, diagonal, alone, n)) <= tolerance)[cells[alone].min(axis=1)]
     # Where a boundary that is gone meets one that is not, some of them.
     for row in np.flatnonzero(np.abs(rest - _sums(cells, diagonal, present & alone, n)) > tolerance).tolist():
         here, corner = np.nonzero((cells == row) & alone[:, None])
         for chosen in product((False, True), repeat=len(here)):
-            if abs(rest[row] - diagonal[here, corner] @ chosen) <= tolerance:
+            if abs(rest[row] - diagonal[here, corner] @ chosen) <= tolerance[row]:
                 present[here] = chosen
                 break
-    return present, shift
+    return present, density * _sums(cells, mass, present, n)
 
 
 def _sums(cells: NDArray, parts: NDArray, some: NDArray[np.bool_], n: int) -> NDArray[np.float64]:

@@ -18,10 +18,11 @@ from ..scalar.notes import vanished_notes
 from ..scalar.placement import Placement
 from ..tolerances import CERTIFIED
 from ..topology import Topology
-from ..topology.keys import with_sides
+from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
-from .lattice import Lattice, rows_alike
+from .lattice import Lattice
+from .seats import seated
 
 _RULE = "2 x 2 Gauss"
 
@@ -31,32 +32,42 @@ def recover_lattice(
 ) -> PlanarMesh | None:
     """The lattice that a matrix is a part of, certified; None where there is none.
 
-    Its cells are continued by those whose vertices are gone, and the mesh of both has the rows of the matrix, entries
-    and diagonal. That such a mesh exists is proved by this; but others may as well, with cells that are not alike.
+    Its cells are continued by those whose vertices are gone, or have rows of the identity, and the mesh of all has the
+    other rows of the matrix, entries and diagonal. That such a mesh exists is proved by this; but others may as well,
+    with cells that are not alike, or no rectangles.
     """
-    if not rows_alike(matrix):
+    if matrix.adds_up.all() or options.method != "conformal":
         return None
+    n, tensor = matrix.n, placement.tensor
+    kept = np.bincount(matrix.edges.ravel(), minlength=n) > 0  # others are rows of the identity
+    if matrix.replaced is not None:
+        kept &= ~matrix.replaced
+    own = np.flatnonzero(kept)
     with clock("lattice"):
-        lattice = Lattice.of(matrix)
-    if lattice is None or len(lattice.z) == matrix.n or options.method != "conformal":
+        lattice = Lattice.of(matrix.among(own)) if len(own) else None
+        seats = None if lattice is None else seated(matrix, own, lattice)
+    if lattice is None or seats is None or len(lattice.z) == len(own):
         return None
     if options.scale is not None and abs(lattice.scale / options.scale - 1) > CERTIFIED:
         return None
-    topology = _topology(matrix, lattice)
-    if topology is None:
+    row, status = seats
+    topology = _topology(matrix, own, row[lattice.cells], bilinear=lattice.neighbours == 8)
+    if topology is None or (topology.multiplicity[own] == 0).any():
         return None
+    (piece,) = topology.pieces
+    status[topology.multiplicity == 0] = 1
     with clock("place"):
-        (piece,) = topology.pieces
-        placed, notes = placement.apply(piece, lattice.z[piece.vertices])
-        tensor = placement.tensor
+        placement, loose = placement.upon(n, [(np.arange(n), status == 0)])
+        z = np.full(n + int((row >= n).sum()), np.nan, dtype=np.complex128)
+        z[row] = lattice.z
+        placed, notes = placement.apply(piece, z[piece.vertices])
         mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / (tensor.root_determinant if tensor else 1)]))
-        design = np.column_stack([lattice.z.real, lattice.z.imag, np.ones(len(lattice.z))])
-        affine = np.linalg.lstsq(design[: matrix.n], mesh.points, rcond=None)[0]
-        gone = design[matrix.n :] @ affine
+        design = np.column_stack([z.real, z.imag, np.ones(len(z))])
+        gone = design[n:] @ np.linalg.lstsq(design[piece.vertices], mesh.points[piece.vertices], rcond=None)[0]
     with clock("certify"):
-        points = np.concatenate([mesh.points, gone])
-        a, b, c = (points @ [1, 1j])[lattice.cells[0, :3]]  # the mesh may be turned over as a whole
-        cells = lattice.cells if (np.conj(b - a) * (c - a)).imag > 0 else lattice.cells[:, ::-1]
+        points, cells = np.concatenate([mesh.points, gone]), row[lattice.cells]
+        a, b, c = (points @ [1, 1j])[cells[0, :3]]  # the mesh may be turned over as a whole
+        cells = cells if (np.conj(b - a) * (c - a)).imag > 0 else cells[:, ::-1]
         if lattice.neighbours == 8:
             seen = tensor.to_laplacian(points @ [1, 1j]) if tensor else points @ [1, 1j]
             certificate = certify_elements(
@@ -67,71 +78,91 @@ def recover_lattice(
             triangles = _divided(cells)
             factor = np.full(len(triangles), float(mesh.scale[0]))
             certificate = certify(matrix.edges, matrix.entries, points, triangles, factor, placement.coefficients)
-        error = _backward_error(matrix, certificate, len(points), lattice.shift)
+        error = _backward_error(matrix, own, certificate, len(points), lattice.added)
     if not error <= CERTIFIED:
         return None
-    lattice_notes = [
-        "this is the only mesh whose cells are all alike; others, bent next to the unknowns that were eliminated, may "
-        "fit as well"
-    ]
-    if lattice.shift:
-        lattice_notes.append(f"{lattice.shift:.6g} times the identity was added to the matrix")
     kind: Callable[..., PlanarMesh] = PlanarMesh
     undivided_cells = [] if lattice.neighbours == 8 else vanished_notes(topology)
     fields = mesh.fields(triangulate=options.triangulate and lattice.neighbours != 8)
     if lattice.neighbours == 8:
-        kind = partial(ConformingMesh, quads=cells[(cells < matrix.n).all(axis=1)], quadrature=_RULE, straight=True)
+        kind = partial(ConformingMesh, quads=cells[(cells < n).all(axis=1)], quadrature=_RULE, straight=True)
         fields = {name: value for name, value in fields.items() if not name.startswith("polygons")}
+    name = "grid" if lattice.rectangles else "lattice"
     return kind(
         **fields,
         points=mesh.points,
         hinges=topology.hinges,
-        node_status=np.zeros(matrix.n, np.int8),
+        node_status=status,
         status="certified",
         uniqueness="ambiguous",
         reason=(
-            f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
+            f"the {name}, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
             f"the matrix back to {error:.1e} (relative), row sums included"
         ),
         operator=placement.operator,
         backward_error=error,
         n_holes=topology.n_holes,
         timings=clock.timings,
-        warnings=(*matrix.warnings, *lattice_notes, *notes, *undivided_cells),
+        warnings=(*matrix.warnings, *_lattice_notes(lattice, status), *loose, *notes, *undivided_cells),
         eliminated_points=gone,
     )
 
 
-def _backward_error(matrix: OperatorMatrix, found: Certificate, n_points: int, shift: float) -> float:
-    """Of entries and of diagonal entries, which say how much is gone, of rows that come first among the points.
+def _lattice_notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
+    only = "of rectangles" if lattice.rectangles else "whose cells are all alike"
+    notes = [f"this is the only mesh {only}; others, bent next to the unknowns that were eliminated, may fit as well"]
+    if lattice.added.any():
+        size = np.median(lattice.added)
+        alike = (np.abs(lattice.added - size) <= CERTIFIED * np.abs(size)).all()
+        what = f"{size:.6g} times the identity" if alike else "a multiple of the lumped mass matrix"
+        notes.append(f"{what} was added to the matrix")
+    if k := int((status == 2).sum()):
+        notes.append(
+            f"{count_of(k, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to corners, "
+            "two rows that were replaced can change places"
+        )
+    return notes
+
+
+def _backward_error(
+    matrix: OperatorMatrix, own: NDArray[np.int64], found: Certificate, n_points: int, added: NDArray
+) -> float:
+    """Of entries and of diagonal entries, which say how much is gone, of the rows `own`, (k,), with `added` (k,).
 
     Relative to the largest off-diagonal entry of each row; infinite where a triangle is flat or turned over.
     """
-    n = matrix.n
-    sums = np.zeros(n)
-    for end in matrix.edges.T:
-        sums += np.bincount(end, matrix.entries, n)
+    n, size = matrix.n, np.full(n_points, np.inf)
+    size[own] = matrix.row_size[own]
+    sums = matrix.row_sums[own] - matrix.diagonal[own]
     for end in found.pairs.T:
-        sums += np.bincount(end, found.differences, n_points)[:n]
-    diagonal = np.abs(shift - sums - matrix.diagonal) / matrix.row_size
-    entries = found.misfits[(found.pairs < n).all(axis=1)]
+        sums += np.bincount(end, found.differences, n_points)[own]
+    diagonal = np.abs(added - sums - matrix.diagonal[own]) / size[own]
+    entries = np.abs(found.differences) / size[found.pairs].min(axis=1)
+    entries = entries[(found.pairs < n).all(axis=1)]
     return np.inf if len(found.flipped) else max(float(entries.max()), float(diagonal.max()))
 
 
-def _topology(matrix: OperatorMatrix, lattice: Lattice) -> Topology | None:
-    """The cells that have all their vertices; None unless they are one piece, with all rows."""
-    cells = lattice.cells[(lattice.cells < matrix.n).all(axis=1)]
-    triangles, known = _divided(cells), matrix.edges
-    if lattice.neighbours == 8:  # without diagonals
+def _topology(
+    matrix: OperatorMatrix, own: NDArray[np.int64], cells: NDArray[np.int64], *, bilinear: bool
+) -> Topology | None:
+    """The cells that have all their vertices; None unless they are one piece with all entries of rows `own`, (k,)."""
+    n, cells = matrix.n, cells[(cells < matrix.n).all(axis=1)]
+    key = matrix.edges @ [n, 1]
+    if cells.shape[1] == 4:
+        turned = contains(key, pair_keys(n, cells[:, 1], cells[:, 3]))  # divided as entries are stored
+        cells = np.where(turned[:, None], np.roll(cells, 1, axis=1), cells)
+    triangles = _divided(cells)
+    known = matrix.edges[np.isin(matrix.edges, cells).all(axis=1) & np.isin(matrix.edges, own).any(axis=1)]
+    if bilinear:  # without diagonals
         known = np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
-    edges, given, opposite = with_sides(matrix.n, known, triangles)
-    pieces = planar_pieces(matrix.n, edges, triangles, opposite)
-    if pieces is None or len(pieces) != 1 or pieces[0].n_vertices < matrix.n or len(pieces[0].edges) < len(edges):
+    edges, given, opposite = with_sides(n, known, triangles)
+    pieces = planar_pieces(n, edges, triangles, opposite)
+    if pieces is None or len(pieces) != 1 or len(pieces[0].edges) < len(edges):
         return None
     added = np.ones(len(edges), dtype=bool)
     added[given] = False
     return Topology(
-        matrix.n, edges, pieces, "3-cycles", vanished=np.flatnonzero(added), polygons=undivided(list(pieces), added)[1]
+        n, edges, pieces, "3-cycles", vanished=np.flatnonzero(added), polygons=undivided(list(pieces), added)[1]
     )
 
 

@@ -170,7 +170,9 @@ class EntriesJacobian:
         return sp.bsr_array((blocks, total.indices, total.indptr), shape=(total.shape[0], 2 * self.n))
 
     def forward(self, displacement: NDArray) -> NDArray:
-        """J d for d (n,) complex: (e,) real."""
+        """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
+        if displacement.ndim > 1:
+            return np.column_stack([self.forward(np.ascontiguousarray(one)) for one in displacement.T])
         changes = []
         for block in self._blocks:
             own: list[NDArray] = []

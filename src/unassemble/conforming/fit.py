@@ -76,8 +76,8 @@ def fitted(
     """
     z, c = corner_positions(part, weights, scale)
     trials = []  # with straight sides: the quadrature that fits best, of those that fit alike the first
-    for rule in _rules(part, straight=True):
-        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
+    for trial in by_rule(part, weights, z, c, noise):
+        trials.append(trial)
         if trials[-1].size <= AGREED:
             break
     least = min(trial.size for trial in trials)
@@ -120,23 +120,21 @@ def _left_by(noise: NDArray | None, c: float) -> float:
     return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
 
 
+def by_rule(
+    part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray[np.float64] | None = None
+) -> Iterator[Fitted]:
+    """Positions (corners,) of straight cells, and c, with every quadrature."""
+    return (_with_rule(part, weights, z, c, noise, rule, straight=True) for rule in _rules(part, straight=True))
+
+
 def _with_rule(
     part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
 ) -> Fitted:
-    entries = _entries(part, rule, straight=straight)
+    entries = Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
     spread = entries.roundings(z) if noise is None else noise
     with np.errstate(invalid="ignore", over="ignore"):  # cells without an area; see `flipped`
         misfit = weights - c * entries.weights(z)
     return Fitted(part, weights, entries, z, c, rule, straight, spread, misfit)
-
-
-def entries_by_rule(part: Part) -> Iterator[tuple[dict[str, str], Entries]]:
-    """Entries of straight cells by every quadrature."""
-    return ((rule, _entries(part, rule, straight=True)) for rule in _rules(part, straight=True))
-
-
-def _entries(part: Part, rule: dict[str, str], *, straight: bool) -> Entries:
-    return Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
 
 
 def _rules(part: Part, *, straight: bool) -> Iterator[dict[str, str]]:

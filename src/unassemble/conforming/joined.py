@@ -6,20 +6,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..certify import Certificate
+from ..certify_elements import certify_elements
 from ..elements.surface import boundary_loops
-from .parts import Part, reversal
+from ..matrix import OperatorMatrix
+from ..scalar.placement import Placement
+from ..topology import Topology
+from .fit import Fitted
+from .parts import reversal
 
 
 class JoinedParts:
     """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
 
-    def __init__(self, parts: Sequence[Part], placed: Sequence[NDArray], n: int):
-        self.points = np.full((n, 2), np.nan)
+    def __init__(self, topology: Topology, fits: Sequence[Fitted], placement: Placement):
+        """Parts are the pieces of the topology."""
+        n = topology.n_vertices
+        self.points = np.full((n, 2), np.nan)  # of each about its origin
         self.component = np.full(n, -1, dtype=np.int64)
         self.blocks: dict[str, NDArray[np.int64]] = {}
-        self.piece: dict[str, NDArray[np.int64]] = {}  # of each cell
-        for label in range(len(parts))[::-1]:  # the first part at a hinge comes last
-            part, z = parts[label], placed[label]
+        self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
+        self._topology, self._fits, self._tensor = topology, fits, placement.tensor
+        nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
+        self.placed, self.origins, self.notes = placement.placed(topology, nodes, remarks)
+        for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
+            part, z = fits[label].part, self.placed[label]
             self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
             self.component[part.piece.vertices] = label
             a, b, c = z[part.piece.triangles].T
@@ -28,10 +39,23 @@ class JoinedParts:
                 own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
                 piece, name = np.full(len(own), label), kind.name
                 self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
-                self.piece[name] = np.concatenate([piece, self.piece.get(name, piece[:0])])
+                self._piece[name] = np.concatenate([piece, self._piece.get(name, piece[:0])])
+
+        shift = self.origins[self.component]
+        self.written = self.points + np.column_stack([shift.real, shift.imag])
+
+    def held(self, matrix: OperatorMatrix, points: NDArray) -> Certificate:
+        """The mesh with these points against the matrix."""
+        if self._tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
+            z = self._tensor.to_laplacian(points @ [1, 1j])
+            points = np.column_stack([z.real, z.imag])
+        scale = np.array([fit.scale for fit in self._fits])
+        factors = {name: scale[piece] for name, piece in self._piece.items()}
+        rules = {name: rule for fit in self._fits for name, rule in fit.rule.items()}
+        return certify_elements(matrix.edges, matrix.entries, points, self.blocks, factors, rules)
 
     def fields(self) -> dict[str, Any]:
-        """Cells and boundary under the names that results have."""
+        """What results say of the mesh, under the names that they have for it."""
         fields: dict[str, Any] = {}
         for name, cells in self.blocks.items():
             corners = 3 if name.startswith("triangle") else 4
@@ -39,4 +63,15 @@ class JoinedParts:
             if cells.shape[1] > corners:
                 fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
         boundary, offsets = boundary_loops(self.blocks)
-        return fields | {"boundary": boundary, "boundary_offsets": offsets}
+        stretch = self._tensor.root_determinant if self._tensor else 1.0
+        return fields | {
+            "points": self.written,
+            "boundary": boundary,
+            "boundary_offsets": offsets,
+            "component": self.component,
+            "hinges": self._topology.hinges,
+            "scale": np.array([fit.scale for fit in self._fits]) / stretch,
+            "n_holes": sum(fit.part.n_holes for fit in self._fits),
+            "quadrature": ", ".join(dict.fromkeys(rule for fit in self._fits for rule in fit.rule.values())),
+            "straight": all(fit.straight for fit in self._fits),
+        }

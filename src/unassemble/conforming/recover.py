@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative
-from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
@@ -113,39 +112,28 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
     with clock("positions"):
         fits = [_fit(stored, part, task) for part in parts]
     with clock("place"):
-        nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
-        placed, origins, notes = task.placement.placed(topology, nodes, remarks)
-        mesh = JoinedParts(parts, placed, stored.n)
-        shift = origins[mesh.component]
-        points = mesh.points + np.column_stack([shift.real, shift.imag])
+        mesh = JoinedParts(topology, fits, task.placement)
     with clock("certify"):
         near = written = _held(stored, mesh, mesh.points, fits, task)
-        if origins.any():
-            written = _held(stored, mesh, points, fits, task)
+        if mesh.origins.any():
+            written = _held(stored, mesh, mesh.written, fits, task)
     with clock("deviations"):
-        bars = deviations_of(stored.n, fits, placed, task) if task.options.standard_deviations else None
+        bars = deviations_of(stored.n, fits, mesh.placed, task) if task.options.standard_deviations else None
     status, uniqueness, reason = verdict(stored, fits, (near, written), task, told=cells.told)
     freedom = sum(fit.freedom for fit in fits)
     left = float(np.linalg.norm(written.certificate.differences))
     return ConformingMesh(
-        points=points,
         **mesh.fields(),
         **written.fields(10 if status == "uncertified" else 0),
-        component=mesh.component,
-        hinges=topology.hinges,
-        scale=np.array([fit.scale for fit in fits]) / task.stretch,
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=status,
         uniqueness=uniqueness,
         reason=reason,
         operator=task.placement.operator,
-        n_holes=sum(part.n_holes for part in parts),
         timings=clock.timings,
-        warnings=(*stored.warnings, *notes),
+        warnings=(*stored.warnings, *mesh.notes),
         standard_deviations=bars,
         estimated_noise=left / float(np.sqrt(freedom)) if freedom > 0 else None,
-        quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
-        straight=all(fit.straight for fit in fits),
     )
 
 
@@ -161,13 +149,6 @@ def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
 
 def _held(stored: OperatorMatrix, mesh: JoinedParts, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
     """A mesh with these points against the matrix, and against the errors of its entries."""
-    tensor = task.placement.tensor
-    if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
-        z = tensor.to_laplacian(points @ [1, 1j])
-        points = np.column_stack([z.real, z.imag])
-    scale = np.array([fit.scale for fit in fits])
-    rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
-    factors = {name: scale[piece] for name, piece in mesh.piece.items()}
-    certificate = certify_elements(stored.edges, stored.entries, points, mesh.blocks, factors, rules)
     known = 1 if task.scale is not None else 0
-    return Held.of(certificate, stored, task.noise, sum(fit.freedom + known for fit in fits), scale)
+    scale = np.array([fit.scale for fit in fits])
+    return Held.of(mesh.held(stored, points), stored, task.noise, sum(fit.freedom + known for fit in fits), scale)

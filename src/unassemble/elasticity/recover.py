@@ -121,6 +121,9 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
+    exchangeable = len(nodal.indices) == nodal.n**2 and numbering.kind != "given"
+    if exchangeable:  # of a rectangle, say, rows along y with those of opposite corners: those of its mirror image
+        notes.append("all nodes are coupled, as those of one element: which rows are of one node may be another choice")
     guessed = guessed_directions(numbering, loose)
     return Body(
         **_cell_fields(shown),
@@ -129,7 +132,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         scale=scale,
         node_status=loose.astype(np.int8),
         status=status,
-        uniqueness="searched" if status == "certified" else None,
+        uniqueness=("ambiguous" if exchangeable else "searched") if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
         operator="elasticity",

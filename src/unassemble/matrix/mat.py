@@ -1,4 +1,4 @@
-"""MATLAB's files of versions 4 to 7.3, and which of their variables is the matrix."""
+"""MATLAB's files of versions 5 to 7.3, and which of their variables is the matrix."""
 
 from typing import Any, BinaryIO
 
@@ -22,19 +22,6 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     held = list(variables(stream.read()))
     found = {key: A for key, _, A in held if A is not None}
     return _chosen(found, {key: shape for key, shape, _ in held}, name, variable)
-
-
-def read_mat4(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
-    """Read a matrix from a MATLAB file of version 4, dense or sparse; as :func:`read_mat`."""
-    from scipy.io import loadmat
-
-    held = {key: value for key, value in loadmat(stream).items() if not key.startswith("__")}
-    found = {
-        key: sp.coo_array(value)
-        for key, value in held.items()
-        if sp.issparse(value) or (value.ndim == 2 and value.dtype.kind in "biufc" and min(value.shape) > 1)
-    }
-    return _chosen(found, {key: value.shape for key, value in held.items()}, name, variable)
 
 
 def read_mat73(stream: BinaryIO, name: str, variable: str | None = None) -> Any:

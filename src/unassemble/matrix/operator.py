@@ -74,6 +74,14 @@ class OperatorMatrix:
         errors = None if self.errors is None else self.errors[~gone]
         return replace(self, edges=self.edges[~gone], entries=self.entries[~gone], errors=errors)
 
+    def among(self, rows: NDArray[np.int64]) -> OperatorMatrix:
+        """The same with some of its rows, (k,) ascending, and their columns only."""
+        number = np.full(self.n, -1)
+        number[rows] = np.arange(len(rows))
+        edges = number[self.edges]
+        gone = np.asarray((edges < 0).any(axis=1))
+        return replace(self.without(gone), n=len(rows), edges=edges[~gone], diagonal=self.diagonal[rows], replaced=None)
+
     def without_joining_zeros(self) -> OperatorMatrix | None:
         """The same without stored zeros between parts that no other entry joins; None where there are none.
 

@@ -18,7 +18,7 @@ from .arrays import read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
 from .market import read_market
-from .mat import read_mat, read_mat4, read_mat73
+from .mat import read_mat, read_mat73
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
 from .triplets import read_triplets
@@ -31,7 +31,6 @@ _READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
 }
 _MATLAB: dict[str, Callable[[BinaryIO, str, str | None], Any]] = {
     "mat": read_mat,
-    "mat4": read_mat4,
     "hdf5": read_mat73,
 }
 

@@ -1,7 +1,6 @@
 """What a file is, by its first bytes rather than by its name."""
 
 import re
-import struct
 
 HEAD = 1024  # bytes that tell
 
@@ -31,8 +30,8 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def kind_of(head: bytes) -> str | None:
     """Which reader a file belongs to; None for none.
 
-    ``"market"``, ``"gzip"``, ``"npz"``, ``"npy"``, ``"mat"`` (MATLAB 5 to 7), ``"mat4"``, ``"hdf5"`` (MATLAB 7.3) or
-    ``"triplets"`` (lines of row, column and entry).
+    ``"market"``, ``"gzip"``, ``"npz"``, ``"npy"``, ``"mat"`` (MATLAB 5 to 7), ``"hdf5"`` (MATLAB 7.3) or ``"triplets"``
+    (lines of row, column and entry).
     """
     text = head.removeprefix(_UTF8_MARK)
     signs = {
@@ -42,23 +41,9 @@ def kind_of(head: bytes) -> str | None:
         "npy": head.startswith(b"\x93NUMPY"),
         "hdf5": head.startswith((_HDF5, b"MATLAB 7.3")) or head[512 : 512 + len(_HDF5)] == _HDF5,
         "mat": head.startswith(b"MATLAB 5") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"),
-        "mat4": _is_mat4(head),
         "triplets": _TRIPLET.match(text) is not None,
     }
     return next((kind for kind, shown in signs.items() if shown), None)
-
-
-def _is_mat4(head: bytes) -> bool:
-    """Whether the first header of a MATLAB file of version 4 makes sense: type, sizes, and the length of a name."""
-    if len(head) < 21:
-        return False
-    for order in "<>":
-        kind, rows, columns, complex_, length = struct.unpack(order + "5i", head[:20])
-        machine, zero, number, layout = kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10
-        sensible = machine == (order == ">") and not zero and number <= 5 and layout <= 2 and complex_ in (0, 1)
-        if sensible and rows >= 0 <= columns and 1 < length < 64 and head[20:21].isalpha():
-            return True
-    return False
 
 
 def foreign(head: bytes, suffix: str = "") -> str:
@@ -74,7 +59,7 @@ def foreign(head: bytes, suffix: str = "") -> str:
     if suffix:
         return f"is a mesh ({suffix}), and a matrix is asked for: name the file of the matrix that was assembled on it"
     if b"\0" in head:
-        return "is a binary file of unknown format, not Matrix Market, .npz, .npy or .mat"
+        return "is a binary file of unknown format, not Matrix Market, .npz, .npy or .mat (version 5 or later)"
     text = head.removeprefix(_UTF8_MARK).lstrip()
     if not text:
         return "holds nothing but blanks"

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.sparse import csgraph
 
 from ..clock import Clock
-from ..errors import SolverError
-from ..linalg import UpperTriangle, factorisation
 from ..recovery import Surface
 from ..tolerances import CERTIFIED
 from ..topology.numbering import connected
@@ -84,40 +83,19 @@ def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArra
 
 
 def _fitted(start: NDArray, edges: NDArray, lengths: NDArray) -> NDArray[np.float64]:
-    """Levenberg and Marquardt's method for (|x_i - x_j|^2 - l^2) / 2 l = 0."""
-    x, damping, solver = start, 1e-2, None
+    """Least squares of (|x_i - x_j|^2 - l^2) / 2 l."""
     rows = np.repeat(np.arange(len(edges)), 6)
     columns = (3 * edges[:, :, None] + np.arange(3)).reshape(len(edges), 6).ravel()
 
-    def residual(at: NDArray) -> tuple[NDArray, NDArray]:
-        side = at[edges[:, 0]] - at[edges[:, 1]]
-        return side / lengths[:, None], ((side**2).sum(axis=1) - lengths**2) / (2 * lengths)
+    def side(x: NDArray) -> NDArray[np.float64]:
+        return x.reshape(-1, 3)[edges[:, 0]] - x.reshape(-1, 3)[edges[:, 1]]
 
-    side, left = residual(x)
-    for _ in range(80):
-        jacobian = sp.csr_array((np.hstack([side, -side]).ravel(), (rows, columns)), shape=(len(edges), x.size))
-        normal = UpperTriangle.of(sp.csr_array(jacobian.T @ jacobian))
-        data = normal.data.copy()
-        data[normal.indptr[:-1]] += damping
-        matrix = normal.with_data(data)
-        solver = solver or factorisation(matrix, definite=True)
-        try:
-            solver.factorise(matrix)
-            trial = x - solver.solve(jacobian.T @ left).reshape(-1, 3)
-        except SolverError:
-            damping *= 10
-            continue
-        new_side, new_left = residual(trial)
-        before, after = float(left @ left), float(new_left @ new_left)
-        if not after < before:
-            if damping > 1e6 or after <= before * (1 + 1e-12):
-                break
-            damping *= 10
-            continue
-        x, side, left = trial, new_side, new_left
-        damping = max(damping / 5, 1e-9)
-        if after > (1 - 1e-4) * before:
-            break
-    if solver is not None:
-        solver.release()
-    return np.asarray(x)
+    def residual(x: NDArray) -> NDArray[np.float64]:
+        return ((side(x) ** 2).sum(axis=1) - lengths**2) / (2 * lengths)
+
+    def jacobian(x: NDArray) -> sp.csr_array:
+        unit = side(x) / lengths[:, None]
+        return sp.csr_array((np.hstack([unit, -unit]).ravel(), (rows, columns)), shape=(len(edges), start.size))
+
+    found = least_squares(residual, start.ravel(), jacobian, ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=80)
+    return np.asarray(found.x).reshape(-1, 3)

@@ -60,8 +60,8 @@ def directions_by_component(
         if votes.max() <= MOST * whole.sum():
             return None
         best = np.flatnonzero(votes == votes.max())
-        run = best[: int(np.argmax(np.append(np.diff(best) > 1, True))) + 1]
-        cuts.append(_settled(matrix, int(run[0]), int(run[-1])))
+        run = best[: int(np.argmax(np.append(np.diff(best) > 1, True))) + 1]  # any of these
+        cuts.append(int(run[0]))
         elsewhere = (last <= run[0]) | (first > run[-1])
         first, last = first[elsewhere], last[elsewhere]
     return np.searchsorted(np.sort(np.array(cuts)), np.arange(order), side="right")
@@ -76,16 +76,6 @@ def _running_sums(matrix: sp.csr_array) -> NDArray[np.float64]:
         here = at[count > k] + k
         sums[here] += sums[here - 1]
     return sums
-
-
-def _settled(matrix: sp.csr_array, first: int, last: int) -> int:
-    """The cut among places that all have the same votes: that for which directions have the least energy."""
-    rows = np.arange(first, last)
-    part = sp.coo_array(matrix[rows])
-    below = np.bincount(part.row, part.data * (part.col < rows[part.row]), len(rows))
-    above = np.bincount(part.row, part.data * (part.col > rows[part.row]), len(rows))
-    step = np.sign(matrix.diagonal().sum()) * (below - above)  # of the energy, as one more row comes below the cut
-    return first + int(np.argmin(np.concatenate([[0.0], np.cumsum(step)])))
 
 
 def nodes_in_runs(

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import LARGE, Budget
+from ..budget import LARGE
 from ..tolerances import HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, with_penalty
 from .directions import spread_directions, with_least_sums
@@ -20,8 +20,6 @@ from .filling import filled, filled_by_direction
 from .grouping import by_first_row, pattern_of, same_pattern, without_doubles
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
-
-_WORK = 2e10  # for directions: half a minute or so
 
 
 def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
@@ -63,7 +61,7 @@ def directions_in_order(
     known = _of_runs(group, d)
     if np.mean(known >= 0) > 0.5 and inner.diagonal().all():
         direction = spread_directions(inner, group, d, known)
-        yield with_least_sums(inner, group, direction, d, Budget(_WORK))
+        yield with_least_sums(inner, group, direction, d)
 
 
 def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
@@ -140,7 +138,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     group = same_pattern(whole)
     known = _of_runs(group, d) if kind == "interleaved" else np.full(len(group), -1)
     direction = spread_directions(whole, group, d, known)
-    direction = with_least_sums(whole, group, direction, d, Budget(_WORK))
+    direction = with_least_sums(whole, group, direction, d)
     if whole is not inner:
         whole = filled_by_direction(whole, direction, d)
         group = same_pattern(whole)

@@ -43,10 +43,21 @@ def edge_weights(piece: Piece, z: NDArray, factor: NDArray | None = None) -> NDA
     return _halved(piece, cotangent(*left), cotangent(*right), factor)
 
 
+def corner_sides(triangles: NDArray, z: NDArray) -> tuple[NDArray, NDArray]:
+    """(m, 3) sides that leave the corners of triangles (m, 3), complex: to the next corner, and to the one before."""
+    corner = z[triangles]
+    return np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
+
+
 def halves(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """(m, 3) halves of the cotangents of triangles, each with the side that it faces as ``piece.opposite`` has them."""
-    corner = z[piece.triangles]
-    return cotangent(np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner) / 2
+    return cotangent(*corner_sides(piece.triangles, z)) / 2
+
+
+def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """(m,) twice the areas of triangles, negative where they run clockwise."""
+    a, b, c = z[piece.triangles].T
+    return np.asarray((np.conj(b - a) * (c - a)).imag)
 
 
 def left_by_all(
@@ -59,8 +70,7 @@ def left_by_all(
     `weights` (edges of the whole graph,): -A_ij of each; `positions` sequence of (n,); `scales` (pieces,).
     """
     union = Together(pieces)
-    corners = np.concatenate(positions)[union.triangles]
-    cotangents = cotangent(np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners)
+    cotangents = cotangent(*corner_sides(union.triangles, np.concatenate(positions)))
     w = np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
     with np.errstate(all="ignore"):
         return np.asarray(weights[union.edge_rows] - np.repeat(scales, [len(piece.edges) for piece in pieces]) * w)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..topology import Piece
 from .cotangent import edge_weights
-from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
+from .normal import GaussNewton, Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 
 def coordinate_covariances(
@@ -53,20 +53,14 @@ def covariances(
     (n, k), for those of the parameters.
     """
     equations = NormalEquations(jacobian, pins)
-    slope = jacobian.transpose(weights)
-    response = equations.solve(slope)
-    complement = float(weights @ weights) - float(np.vdot(slope, response).real)
+    system = GaussNewton(jacobian, equations, weights if free_scale else None)
     one, d = np.ones(len(z)), z - z.mean()
     fields = np.column_stack([one + 0j, 1j * one, d, 1j * d])  # displacements that change no angle
     gauge = np.linalg.qr(np.stack([fields.real, fields.imag], axis=1).reshape(2 * len(z), 4))[0]
     root = np.eye(2) if stretch is None else stretch
     total = np.zeros((len(z), 2, 2))
     for noise in noise_blocks(len(weights), options or SamplingOptions()):
-        y = equations.solve(np.column_stack([jacobian.transpose(column) for column in noise.T]))
-        if free_scale and complement > 0:
-            along = (weights @ noise - np.real(slope.conj() @ y)) / complement
-            y = y - response[:, None] * along
-        moves = nodes(y)
+        moves = nodes(system(jacobian, noise))
         flat = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(moves), -1)
         flat -= gauge @ (gauge.T @ flat)
         moved = root @ flat.reshape(len(moves), 2, -1)

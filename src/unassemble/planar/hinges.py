@@ -9,6 +9,7 @@ from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
 from ..topology.numbering import connected
+from .cotangent import areas
 
 _DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
@@ -60,8 +61,8 @@ def _matching_images(
     best = _joined(topology, positions, held)[1]
     if best > closed:
         # Triangles of all pieces the same way round, as those of one embedding are; held pieces stay as they are.
-        corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
-        turned_over = np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
+        pairs = zip(topology.pieces, positions, strict=True)
+        turned_over = np.array([float(areas(piece, z).sum()) < 0 for piece, z in pairs])
         group = groups(topology)
         away = np.isin(group, group[held & turned_over]) ^ turned_over
         drawn = [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]

@@ -13,37 +13,33 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from ..linalg import UpperTriangle, factorisation, upper_from_edges
+from ..linalg import UpperTriangle, factorisation
 from ..tolerances import SINGULAR
 from ..topology import Piece
-from .cotangent import corner_gradients
-from .normal import Jacobian, WeightJacobian
+from .cotangent import corner_gradients, corner_sides, cotangent
+from .normal import Jacobian, NormalEquations, WeightJacobian
+from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
 
 
-class IterativeNormalEquations:
-    """Steps as of :class:`~unassemble.planar.polish.GaussNewton`, in linear memory.
+class IterativeNormalEquations(NormalEquations):
+    """The same in linear memory, of triangles counter-clockwise; solutions have no component along similarities."""
 
-    Solutions have no component along similarities.
+    def __init__(self, jacobian: WeightJacobian):
+        self.renew(jacobian)
 
-    Where the scale is fitted as well, `weights` (e,) is the direction in which it moves the weights. The solution is
-    then the best displacement together with the best scale, for misfits that have no component along this direction.
-
-    `z` (n,): the positions of the Jacobian, triangles counter-clockwise.
-    """
-
-    def __init__(self, piece: Piece, jacobian: WeightJacobian, z: NDArray, weights: NDArray | None):
-        self._forward = jacobian.matrix.tocsr()
-        self._scaling = None if weights is None else weights / np.linalg.norm(weights)
+    def renew(self, jacobian: Jacobian) -> None:
+        """For other positions."""
+        assert isinstance(jacobian, WeightJacobian)
+        self._forward, z = jacobian.matrix.tocsr(), jacobian.z
         self._gauge = np.linalg.qr(np.column_stack([np.ones(len(z)), z - z.mean()]))[0]
-        energy = _weighted_energy(piece, z, jacobian.spread)
+        energy = _weighted_energy(jacobian.piece, z, jacobian.spread)
         self._factor = factorisation(energy)
         self._factor.factorise(energy)
 
-    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
-        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
-        rhs = jacobian.transpose(misfit)
+    def solve(self, rhs: NDArray) -> NDArray:
+        """Displacement d (n,) complex with J'J d = rhs."""
         x = np.zeros_like(rhs)
         residual = self._project(rhs)
         direction = y = self._precondition(residual)
@@ -61,15 +57,8 @@ class IterativeNormalEquations:
         _log.debug("normal equations: %d iterations, reduction %.1e", iterations, np.sqrt(size / first) if first else 0)
         return x
 
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._factor.release()
-
     def _apply(self, d: NDArray) -> NDArray:
-        change = self._forward @ d.view(np.float64)
-        if self._scaling is not None:
-            change -= self._scaling * (self._scaling @ change)
-        return (self._forward.T @ change).view(np.complex128)
+        return (self._forward.T @ (self._forward @ d.view(np.float64))).view(np.complex128)
 
     def _precondition(self, residual: NDArray) -> NDArray:
         return self._project(np.append(self._factor.solve(residual[:-1]), 0))
@@ -84,23 +73,12 @@ def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle
     L_t and T_t are the triangle's Laplacian and signed area; a_t makes the trace of its term that of its share of J'J
     for complex-linear displacements.
     """
-    at = z[piece.triangles]
-    u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
-    at_u, at_w = corner_gradients(u, w)
-    product = np.conj(u) * w
-    cotangent = product.real / product.imag
-    trace = cotangent.sum(axis=1) / 2
+    u, w = corner_sides(piece.triangles, z)
+    at_u, at_w, cotangents = *corner_gradients(u, w), cotangent(u, w)
     gradients = np.abs(at_u) ** 2 + np.abs(at_w) ** 2 + np.abs(at_u + at_w) ** 2
-    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
-    # Each corner contributes to the edge that faces it, run through from tail to head.
-    share = (weight[:, None] * cotangent / 4).ravel()
-    # The similarity itself, which is projected out, would make the energy singular.
-    area = weight * (1 - SINGULAR) / 4
-    left, right = piece.facing.T
-    real = share[left] + np.where(piece.inner, share[right], 0)
-    turn = area[left // 3] - np.where(piece.inner, area[right // 3], 0)
-    upwards = piece.stencil[0] < piece.stencil[1]
-    off_diagonal = -real + 1j * np.where(upwards, turn, -turn)
-    diagonal = np.bincount(piece.edges.ravel(), np.repeat(real, 2), piece.n_vertices)
-    kept = piece.edges[:, 1] < piece.n_vertices - 1
-    return upper_from_edges(piece.n_vertices - 1, piece.edges[kept], off_diagonal[kept], diagonal[:-1])
+    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / cotangents.sum(axis=1)
+    one, other = weight[piece.facing // 3].T
+    strength = one - np.where(piece.inner, other, 0)  # each triangle runs along its edges, counter-clockwise
+    weights = np.bincount(piece.opposite.ravel(), (weight[:, None] * cotangents / 2).ravel(), len(piece.edges))
+    pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.stencil[:2].T, weights, strength)
+    return pencil.matrix(1 - SINGULAR)  # the similarity itself, which is projected out, would make it singular

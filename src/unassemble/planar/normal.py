@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from .cotangent import weight_gradient
 
@@ -22,7 +23,7 @@ class Jacobian(Protocol):
         """(e, 2 n) in blocks of x and y."""
 
     def forward(self, displacement: NDArray) -> NDArray:
-        """J d for d (n,) complex: (e,) real."""
+        """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
@@ -35,7 +36,7 @@ class WeightJacobian:
     """
 
     def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
-        self.n = piece.n_vertices
+        self.n, self.piece, self.z = piece.n_vertices, piece, z
         self.spread = np.ones(len(piece.edges)) if spread is None else spread
         self._vertices = piece.stencil
         with np.errstate(invalid="ignore"):  # flat triangles
@@ -50,8 +51,8 @@ class WeightJacobian:
         return sp.bsr_array((blocks, vertices, np.arange(0, 4 * e + 1, 4, dtype=np.int32)), shape=(e, 2 * self.n))
 
     def forward(self, displacement: NDArray) -> NDArray:
-        """J d for d (n,) complex: (e,) real."""
-        return np.einsum("ke,ke->e", self._gradient, displacement[self._vertices]).real
+        """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
+        return np.einsum("ke,ke...->e...", self._gradient, displacement[self._vertices]).real
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
@@ -91,13 +92,41 @@ class NormalEquations:
         result[self._free] = np.ascontiguousarray(solution.T).view(np.complex128).T
         return result
 
-    def fitted(self, jacobian: Jacobian, change: NDArray) -> NDArray:
-        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
-        return self.solve(jacobian.transpose(change))
+    def fitted(self, jacobian: Jacobian, changes: NDArray) -> NDArray:
+        """Displacements d, (n,) or (n, k), that explain changes r, (e,) or (e, k), of weights best: least |J d - r|."""
+        if changes.ndim == 1:
+            return self.solve(jacobian.transpose(changes))
+        return self.solve(np.column_stack([jacobian.transpose(change) for change in changes.T]))
 
     def release(self) -> None:
         """Give the memory of the factor back."""
         self._factor.release()
+
+
+class GaussNewton:
+    """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g.
+
+    `weights` (e,): w, over their standard deviations; None where the scale is known.
+    """
+
+    def __init__(self, jacobian: Jacobian, equations: NormalEquations, weights: NDArray | None):
+        self._equations, self._weights = equations, weights
+        if weights is not None:
+            self._response = equations.fitted(jacobian, weights)
+            # What J cannot explain of w; nothing but rounding means that c and the shape are confounded.
+            left = float(weights @ (weights - jacobian.forward(self._response)))
+            self._complement = left if left > LAST_DIGITS * float(weights @ weights) else 0.0
+
+    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
+        """Displacements d, (n,) or (n, k) complex, for misfits r, (e,) or (e, k).
+
+        The scale follows from them by least squares.
+        """
+        move = self._equations.fitted(jacobian, misfit)
+        if self._weights is None or not self._complement:
+            return move
+        log_scale = self._weights @ (misfit - jacobian.forward(move)) / self._complement
+        return move - np.multiply.outer(self._response, log_scale)
 
 
 def _factorised(matrix: UpperTriangle) -> Factorisation:

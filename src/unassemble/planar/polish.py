@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..tolerances import LAST_DIGITS, ROUNDED
+from ..tolerances import ROUNDED
 from ..topology import Piece
+from .cotangent import areas
 from .iterative import IterativeNormalEquations
-from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
+from .normal import GaussNewton, NormalEquations, WeightJacobian, distant_pair
 from .problem import Cotangents, Model, Problem, downhill
 
 _log = logging.getLogger(__name__)
@@ -92,22 +93,20 @@ def polish(
     if not np.isfinite(fit.weights).all():
         raise SolverError("cells are flat")
     equations: NormalEquations | None = None
-    system: GaussNewton | IterativeNormalEquations | None = None
+    system: GaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     history: list[tuple[float, float]] = []
     while steps < options.max_steps and not converged:
         jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
         if system is None:
-            fitted = fit.weights if scale is None else None
-            if isinstance(drawn, Piece) and len(z) > options.direct_limit:
-                system = IterativeNormalEquations(drawn, WeightJacobian(drawn, fit.z, spread), fit.z, fitted)
+            if equations is not None:
+                equations.renew(jacobian)
+            elif isinstance(jacobian, WeightJacobian) and len(z) > options.direct_limit:
+                equations = IterativeNormalEquations(jacobian)
             else:
-                if equations is None:
-                    equations = NormalEquations(jacobian, pins)
-                else:
-                    equations.renew(jacobian)
-                system = GaussNewton(jacobian, equations, fitted)
+                equations = NormalEquations(jacobian, pins)
+            system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -115,8 +114,6 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
-            if isinstance(system, IterativeNormalEquations):
-                system.release()
             system, length = None, np.inf
             continue
         change, share = float(np.linalg.norm(jacobian.forward(move))), 1.0
@@ -140,16 +137,13 @@ def polish(
         fit = better or fit
     if equations is not None:
         equations.release()
-    elif isinstance(system, IterativeNormalEquations):
-        system.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, factorisations, converged, length)
 
 
 def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """Twice the area of each triangle (m,), positive for the orientation that prevails."""
-    a, b, c = z[piece.triangles].T
-    areas = (np.conj(b - a) * (c - a)).imag
-    return areas if areas.sum() >= 0 else -areas
+    signed = areas(piece, z)
+    return signed if signed.sum() >= 0 else -signed
 
 
 def count_flipped(piece: Piece, z: NDArray) -> int:
@@ -168,24 +162,3 @@ def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:
     if not (np.isfinite(uneven) and uneven > ROUNDED):
         return False
     return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))
-
-
-class GaussNewton:
-    """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
-
-    def __init__(self, jacobian: Jacobian, equations: NormalEquations, weights: NDArray | None):
-        self._equations = equations
-        self._weights = weights  # None where the scale is known
-        if weights is not None:
-            self._response = equations.fitted(jacobian, weights)
-            # What J cannot explain of w; nothing but rounding means that c and the shape are confounded.
-            left = float(weights @ (weights - jacobian.forward(self._response)))
-            self._complement = left if left > LAST_DIGITS * float(weights @ weights) else 0.0
-
-    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
-        """Displacement d (n,) complex; the scale follows from it by least squares."""
-        move = self._equations.fitted(jacobian, misfit)
-        if self._weights is None or not self._complement:
-            return move
-        log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
-        return move - log_scale * self._response

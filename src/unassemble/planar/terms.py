@@ -13,7 +13,7 @@ from scipy.special import fdtrc
 
 from ..errors import SolverError
 from ..topology import Piece
-from .cotangent import cotangent, edge_weights
+from .cotangent import areas, edge_weights, halves
 from .normal import NormalEquations, WeightJacobian, distant_pair
 from .polish import PolishOptions
 
@@ -53,10 +53,8 @@ def lacking_term(
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
         both = np.column_stack([weights / scale / spread - fitted, terms, fitted])
-        moves = equations.solve(np.column_stack([jacobian.transpose(column) for column in both.T]))
+        both -= jacobian.forward(equations.fitted(jacobian, both))  # what displacements cannot explain of these
         equations.release()
-        # What displacements cannot explain of these changes of the weights.
-        both -= np.column_stack([jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])
     except SolverError:
         return None
     if free_scale and (size := float(np.linalg.norm(both[:, -1]))) > 0:  # less what a change of scale explains
@@ -87,10 +85,7 @@ def _explained(misfit: NDArray, columns: NDArray) -> float:
 def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     """Names (k,) and entries (e, k) of terms, as weights."""
     corners = z[piece.triangles]
-    u, w = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    with np.errstate(all="ignore"):
-        halves = cotangent(u, w) / 2  # of each corner, for the edge that it faces
-    area = np.abs((np.conj(u[:, 0]) * w[:, 0]).imag) / 2
+    area = np.abs(areas(piece, z)) / 2
     middle = corners.mean(axis=1)
     middle = (middle - middle.mean()) / (np.abs(middle - middle.mean()).max(initial=0.0) or 1.0)
     x, y = middle.real, middle.imag
@@ -101,6 +96,6 @@ def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     size = np.broadcast_to(area[:, None], corners.shape) / area.mean()
     powers = (x, y, x * x, x * y, y * y)
     mass = [summed(size * factor[:, None]) for factor in (np.ones_like(x), *powers)]
-    varying = [summed(halves * factor[:, None]) for factor in powers]
+    varying = [summed(halves(piece, z) * factor[:, None]) for factor in powers]
     names = np.array([*([MASS] * len(mass)), *([COEFFICIENT] * len(varying)), ONE_SIGN])
     return names, np.column_stack([*mass, *varying, np.ones(len(piece.edges))])

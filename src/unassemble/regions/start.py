@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..boundaries.embedding import areas, relaxed, tutte
+from ..boundaries.embedding import relaxed, tutte
 from ..boundaries.first import guessed
 from ..boundaries.patch import distance
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import ConformalOptions, conformal_map
-from ..planar.cotangent import edge_weights
+from ..planar.cotangent import areas, corner_sides, edge_weights
 from ..topology import Piece
 
 
@@ -75,8 +75,8 @@ def _unfolded(piece: Piece, z: NDArray) -> NDArray[np.complex128] | None:
 
 def _folded(piece: Piece, z: NDArray) -> NDArray[np.bool_]:
     """(n,) vertices of triangles that are turned over, and those inside around which triangles go more than once."""
-    corner = z[piece.triangles]
-    angle = np.angle((np.roll(corner, 1, axis=1) - corner) * np.conj(np.roll(corner, -1, axis=1) - corner))
+    after, before = corner_sides(piece.triangles, z)
+    angle = np.angle(before * np.conj(after))
     around = np.bincount(piece.triangles.ravel(), angle.ravel(), piece.n_vertices)
     folded = np.abs(around - 2 * np.pi) > 1
     folded[piece.boundary] = False

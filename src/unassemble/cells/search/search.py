@@ -10,7 +10,7 @@ from ...topology.embedding import face_complexes
 from ..candidates.candidates import Candidates, widened
 from ..candidates.choosing import likely_labels
 from ..judge.labelling import Labelling
-from ..propagate.peeling import ContradictionError, lone_scales, peeled
+from ..propagate import ContradictionError, lone_scales, told
 from ..relax.relaxation import with_holes
 from .best_first import BestFirst, Judge, better
 from .leaps import leapt
@@ -67,7 +67,7 @@ def _with_holes(candidates: Candidates, judge: Judge) -> Labelling | None:
     for c in lone_scales(sides, weights) if candidates.scale is None else [candidates.scale]:
         with suppress(ContradictionError):
             known = Candidates.of(candidates.embedding, weights, c)
-            best = _relaxed(known, peeled(sides, 2 * weights / c), judge.part(0.5))
+            best = _relaxed(known, told(sides, 2 * weights / c), judge.part(0.5))
             break
     if candidates.scale is None and (best is None or not best.fits):
         best = _relaxed(candidates, np.zeros(len(sides), dtype=np.int8), judge) or best

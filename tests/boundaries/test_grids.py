@@ -1,0 +1,158 @@
+"""Grids of rectangles, alike or not, with Dirichlet conditions of every kind; scikit-fem assembles."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri, asm, enforce
+from skfem.models import laplace
+
+from meshes import largest_error
+from unassemble import ConformingMesh, RecoveryError, recover
+
+UNIFORM = np.arange(9.0), 0.7 * np.arange(8.0)
+GRADED = np.append(0, np.cumsum(1.3 ** np.arange(11))), np.append(0, np.cumsum(np.sin(np.arange(9) + 1) + 1.5))
+STEPS = pytest.mark.parametrize("lines", [UNIFORM, GRADED], ids=["uniform", "graded"])
+ELEMENTS = pytest.mark.parametrize("element", ["P1", "Q1"])
+
+
+def assembled(element, lines):
+    """A stiffness matrix with some c, and points."""
+    if element == "P1":
+        basis = Basis(MeshTri.init_tensor(*lines), ElementTriP1())
+    else:
+        basis = Basis(MeshQuad.init_tensor(*lines), ElementQuad1())
+    return 3.7 * sp.csr_array(asm(laplace, basis)), basis.mesh
+
+
+def shuffled(matrix, points, seed=1):
+    order = np.random.default_rng(seed).permutation(len(points))
+    return sp.csr_array(matrix)[order][:, order], points[order]
+
+
+def check(matrix, points, *, known, plausible=0):
+    """Certified, with so many rows determined, and all of them right."""
+    matrix, points = shuffled(matrix, points)
+    found = recover(matrix)
+    assert found.certified, found.reason
+    right = found.node_status == 0
+    assert right.sum() == known
+    assert (found.node_status == 2).sum() == plausible
+    assert largest_error(found.points[right], points[right]) <= 1e-11
+    assert found.scale == pytest.approx(3.7, rel=1e-11)
+    assert found.uniqueness == "ambiguous"
+    return found
+
+
+@STEPS
+@ELEMENTS
+def test_eliminated(element, lines):
+    matrix, mesh = assembled(element, lines)
+    inside = mesh.interior_nodes()
+    found = check(matrix[inside][:, inside], mesh.p.T[inside], known=len(inside))
+    assert isinstance(found, ConformingMesh) == (element == "Q1")
+    assert len(found.eliminated_points) == len(mesh.boundary_nodes())
+
+
+@STEPS
+@ELEMENTS
+def test_on_one_side(element, lines):
+    matrix, mesh = assembled(element, lines)
+    kept = np.flatnonzero(mesh.p[0] > 0)
+    check(matrix[kept][:, kept], mesh.p.T[kept], known=len(kept))
+
+
+@STEPS
+@ELEMENTS
+def test_identity_rows(element, lines):
+    """Zeros that stay stored between replaced rows show where corners are."""
+    matrix, mesh = assembled(element, lines)
+    matrix = enforce(sp.csr_matrix(matrix), D=mesh.boundary_nodes())
+    found = check(matrix, mesh.p.T, known=mesh.nvertices)
+    assert not len(found.eliminated_points)
+
+
+@STEPS
+@ELEMENTS
+def test_identity_rows_without_zeros(element, lines):
+    """Corners of right triangles are in no other row then, and of equal squares two rows beside each change places."""
+    lines = (lines[0], lines[0]) if lines is UNIFORM else lines
+    matrix, mesh = assembled(element, lines)
+    matrix = enforce(sp.csr_matrix(matrix), D=mesh.boundary_nodes())
+    matrix.eliminate_zeros()
+    corners = 4 if element == "P1" else 0
+    plausible = 8 if element == "P1" and lines[0] is lines[1] else 0
+    found = check(matrix, mesh.p.T, known=mesh.nvertices - corners - plausible, plausible=plausible)
+    assert len(found.eliminated_points) == corners
+
+
+@STEPS
+@ELEMENTS
+def test_identity_rows_on_one_side(element, lines):
+    matrix, mesh = assembled(element, lines)
+    matrix = enforce(sp.csr_matrix(matrix), D=np.flatnonzero(mesh.p[0] == 0))
+    check(matrix, mesh.p.T, known=mesh.nvertices)
+
+
+@STEPS
+@ELEMENTS
+def test_rows_and_columns_of_the_identity(element, lines):
+    matrix, mesh = assembled(element, lines)
+    inside = mesh.interior_nodes()
+    free = sp.diags_array(np.isin(np.arange(mesh.nvertices), inside).astype(float))
+    matrix = sp.csr_array(free @ matrix @ free + sp.eye_array(mesh.nvertices) - free)
+    matrix.eliminate_zeros()
+    found = check(matrix, mesh.p.T, known=len(inside))
+    assert np.isnan(found.points[found.node_status == 1]).all()
+
+
+@pytest.mark.parametrize("density", [0.04, 30.0])
+def test_a_lumped_mass_matrix_added(density):
+    """Implicit Euler steps of the heat equation by finite volumes."""
+    matrix, mesh = assembled("P1", GRADED)
+    x, y = (np.convolve(np.diff(line), [0.5, 0.5], "valid") for line in GRADED)
+    inside = mesh.interior_nodes()
+    mass = {
+        (a, b): h * k for a, h in zip(GRADED[0][1:], x, strict=False) for b, k in zip(GRADED[1][1:], y, strict=False)
+    }
+    added = sp.diags_array([density * mass[tuple(at)] for at in mesh.p.T[inside].tolist()])
+    found = check(matrix[inside][:, inside] + added, mesh.p.T[inside], known=len(inside))
+    assert "a multiple of the lumped mass matrix was added" in " ".join(found.warnings)
+
+
+def test_a_step_and_a_hole():
+    """Unknowns eliminated all around a domain that is no rectangle."""
+    matrix, mesh = assembled("Q1", (np.append(0, np.cumsum(1.1 ** np.arange(18))), GRADED[1]))
+    i, j = (np.searchsorted(line, at) for line, at in zip(map(np.unique, mesh.p), mesh.p, strict=True))
+    kept = np.isin(np.arange(mesh.nvertices), mesh.interior_nodes()) & ~((i > 11) & (j > 5)) & ~((i == 5) & (j == 4))
+    found = check(matrix[kept][:, kept], mesh.p.T[kept], known=int(kept.sum()))
+    assert found.n_holes == 1
+
+
+def test_slender_cells():
+    """A boundary layer: cells 10,000 times as long as they are high."""
+    matrix, mesh = assembled("P1", (np.arange(12.0), np.append(0, np.cumsum(1e-4 * 1.8 ** np.arange(12)))))
+    inside = mesh.interior_nodes()
+    check(matrix[inside][:, inside], mesh.p.T[inside], known=len(inside))
+
+
+@ELEMENTS
+@pytest.mark.parametrize("which", ["entry", "diagonal", "column"])
+def test_one_wrong_number(element, which):
+    matrix, mesh = assembled(element, GRADED)
+    held = np.isin(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    matrix = sp.lil_array(enforce(sp.csr_matrix(matrix), D=np.flatnonzero(held)))
+    inside = np.flatnonzero(~held)
+    neighbours = np.array(matrix.rows[inside[30]])
+    if which == "diagonal":
+        matrix[inside[30], inside[30]] *= 1 + 1e-6
+    elif which == "entry":
+        other = neighbours[~held[neighbours] & (neighbours != inside[30])][0]
+        matrix[inside[30], other] = matrix[other, inside[30]] = matrix[other, inside[30]] * (1 + 1e-6)
+    else:
+        row = next(row for row in inside.tolist() if held[matrix.rows[row]].any())
+        matrix[row, next(other for other in matrix.rows[row] if held[other])] *= 1 + 1e-6
+    try:
+        found = recover(shuffled(matrix, mesh.p.T)[0])
+    except RecoveryError:
+        return
+    assert not found.certified
