@@ -51,6 +51,18 @@ def test_eliminated_third_party(name):
     assert determined(found, points) >= 0.7
 
 
+@pytest.mark.slow
+@needs_shared
+@pytest.mark.parametrize("name", ["airfoil_matlab", "airfoil2_barth"])
+def test_edges_of_very_different_lengths(name):
+    """Positions that fit entries are found by way of lengths only."""
+    matrix, points = identity_rows(corpus(name), -0.7)
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert determined(found, points) >= 0.99
+    assert found.scale == pytest.approx(-0.7, rel=1e-9)
+
+
 def test_eliminated_in_part():
     """Natural conditions on one side: entries there are those of a boundary, and count."""
     matrix, points = eliminated(jittered(seed=1), lambda x: x[0] < 0.7)
