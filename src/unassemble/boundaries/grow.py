@@ -9,8 +9,7 @@ taken it, and from random triangles where that leads to no end.
 from __future__ import annotations
 
 import logging
-from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ from ..planar.cotangent import areas, weight_roundings
 from ..tolerances import CERTIFIED
 from ..topology import Piece
 from .fit import Scale, WholeEntries
-from .patch import Patch, fit_near
+from .patch import fit_near
 
 _log = logging.getLogger(__name__)
 
@@ -28,47 +27,26 @@ Vertices = tuple[int, ...]  # in ascending order
 
 
 def grow(
-    problem: WholeEntries, z: NDArray[np.complex128], scale: Scale, whole: NDArray[np.bool_], known: NDArray[np.bool_],
-    enough: float,
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:  # fmt: skip
+    problem: WholeEntries, z: NDArray[np.complex128], scale: Scale, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Positions, and the vertices (n,) that are known with some, (n,) bool, such that whole entries (e,) fit."""
-    patch = Patch.about(problem.piece, ~known)
-    part, place = patch.of(problem, scale), patch.vertices
-    asked = whole[patch.edges] & part.asked
-    left = whole.sum() - enough  # entries that may be left
-    there, more = _grown(part, z[place], scale, asked, known[place], asked.sum() - left)
-    z, known = z.copy(), known.copy()
-    z[place], known[place] = there, more
-    return z, known
-
-
-def _grown(
-    problem: WholeEntries, z: NDArray[np.complex128], scale: Scale, whole: NDArray[np.bool_], known: NDArray[np.bool_],
-    most: float,
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:  # fmt: skip
-    """The same where all entries depend on vertices that are not known at first."""
     piece, first, held = problem.piece, z, known
     rng, failed, idle = np.random.default_rng(1), set[Vertices](), 0
-    among = whole & known[piece.stencil].all(axis=0)
-    while idle < 3 and among.sum() < most:
+    while idle < 3:
         ties = _Ties.of(piece, problem.gradient(z, scale), whole, known)
-        sets = ties.sets(failed, 4) or ties.sets(failed, 24)
+        sets = ties.sets(failed)
         if not sets:
             break
         there, more = _fitted(problem, _carried(piece, first, z, known, sets), scale, known, ties, sets, rng)
         among = whole & more[piece.stencil].all(axis=0)
-        there = fit_near(problem, there, scale, among, more & ~held, ((0.0, 2),))  # errors would add up
+        there = fit_near(problem, there, scale, among, more & ~held, ((0.0, 5),))  # errors would add up
+        fits = np.abs(problem.misfits(there, scale)) <= 1e-12 * weight_roundings(piece, there)
         idle += 1
-        if more.sum() > known.sum() and _fitting(problem, there, scale, 1e-12)[among].all():
+        if more.sum() > known.sum() and fits[among].all():
             z, known, idle = there, more, 0
         failed.update(some for some in sets if not known[list(some)].any())
         _log.debug("%d vertices known, %d sets do not fit", known.sum(), len(failed))
     return z, known
-
-
-def _fitting(problem: WholeEntries, z: NDArray, scale: Scale, most: float) -> NDArray[np.bool_]:
-    """(e,) entries with misfits of at most so much, relative to what rounding does to them."""
-    return np.asarray(np.abs(problem.misfits(z, scale)) <= most * weight_roundings(problem.piece, z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +58,6 @@ class _Ties:
     vertices: dict[int, list[int]]  # of each entry, those that are not known
     entries: dict[int, list[int]]  # of each of these vertices
     front: list[int]  # those of them with neighbours that are known
-    judged: dict[Vertices, bool]  # sets that entries determine and check, and those that they do not
 
     @classmethod
     def of(cls, piece: Piece, gradient: NDArray, whole: NDArray[np.bool_], known: NDArray[np.bool_]) -> _Ties:
@@ -92,15 +69,15 @@ class _Ties:
             for v in vertices[e]:
                 entries[v].append(e)
         beside = np.unique(piece.edges[known[piece.edges].any(axis=1)])
-        return cls(piece.stencil, gradient, vertices, entries, [v for v in beside.tolist() if v in entries], {})
+        return cls(piece.stencil, gradient, vertices, entries, [v for v in beside.tolist() if v in entries])
 
-    def within(self, some: Sequence[int]) -> list[int]:
+    def within(self, some: Vertices) -> list[int]:
         """Entries that depend on some vertices and on known ones only."""
         return sorted({e for v in some for e in self.entries[v] if set(self.vertices[e]).issubset(some)})
 
-    def sets(self, failed: set[Vertices], most: int) -> list[Vertices]:
-        """Sets without common vertices that have not failed, the smallest first, of so many about each of the front."""
-        found = {some for v in self.front if (some := self._about(v, failed, most))}
+    def sets(self, failed: set[Vertices]) -> list[Vertices]:
+        """Sets without common vertices, the smallest ones of each first, none that has failed."""
+        found = {some for v in self.front if (some := self._about(v, failed))}
         taken, chosen = set[int](), list[Vertices]()
         for some in sorted(found, key=lambda some: (len(some), some)):
             if taken.isdisjoint(some):
@@ -108,13 +85,15 @@ class _Ties:
                 chosen.append(some)
         return chosen
 
-    def _about(self, v: int, failed: set[Vertices], most: int) -> Vertices | None:
+    def _about(self, v: int, failed: set[Vertices]) -> Vertices | None:
         """The first determined vertices among those about one of the front; what entries tie most comes next."""
         own = [v]
-        while len(own) <= most:
-            some = self._dense(own)
-            if some and some not in failed and (len(some) == 1 or self._held(some)):
-                return some
+        while len(own) <= 24:
+            some = tuple(sorted(own))
+            if len(self.within(some)) > 2:
+                some = self._held(some)
+                if some and some not in failed:
+                    return some
             tied = defaultdict[int, float](float)
             for e in {e for w in own for e in self.entries[w]}:
                 tied.update({w: 0.0 for w in self.vertices[e] if w not in own})
@@ -125,23 +104,14 @@ class _Ties:
             own.append(max(tied, key=lambda w: (tied[w], -w)))
         return None
 
-    def _dense(self, some: Sequence[int]) -> Vertices:
-        """Those of some vertices that have more entries than coordinates, each of them three at least."""
-        while some:
-            entries = self.within(some)
-            count = Counter(v for e in entries for v in self.vertices[e])
-            many = tuple(sorted(v for v in some if count[v] > 2))
-            if len(many) == len(some):
-                return many if len(entries) > 2 * len(many) else ()
-            some = many
+    def _held(self, some: Vertices) -> Vertices:
+        """Those of some vertices that entries which depend on no others determine and check."""
+        while some and (entries := self.within(some)):
+            which = held(self.stencil[:, entries], self.gradient[:, entries], some)
+            if which == some:
+                return some
+            some = which
         return ()
-
-    def _held(self, some: Vertices) -> bool:
-        """Whether entries that depend on no others determine and check all of some vertices."""
-        if some not in self.judged:
-            entries = self.within(some)
-            self.judged[some] = held(self.stencil[:, entries], self.gradient[:, entries], some) == some
-        return self.judged[some]
 
 
 def held(stencil: NDArray, gradient: NDArray, some: Vertices) -> Vertices:
@@ -168,14 +138,14 @@ def _fitted(
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:  # fmt: skip
     """Positions, with those of sets that fit, and the vertices (n,) that are known then."""
     piece, z, known = problem.piece, start.copy(), known.copy()
-    for _ in range(3):
+    for _ in range(6):
         entries = {some: ties.within(some) for some in sets}
         free, used = np.zeros(len(z), dtype=bool), np.zeros(len(piece.edges), dtype=bool)
         free[np.concatenate(sets)] = True
         used[np.concatenate(list(entries.values()))] = True
         with np.errstate(all="ignore"):  # random triangles may lead far away
             there = fit_near(problem, start, scale, used, free, ((1e-3, 5), (0.0, 20)))
-            fits = _fitting(problem, there, scale, CERTIFIED)
+            fits = np.abs(problem.misfits(there, scale)) <= CERTIFIED * weight_roundings(piece, there)
             gradient, area = problem.gradient(there, scale), areas(piece, there)
         folded = np.zeros(len(z), dtype=bool)
         folded[piece.triangles[(known | free)[piece.triangles].all(axis=1) & ~(area > 0)]] = True

@@ -82,19 +82,15 @@ def fit_inside(given: PieceEntries, scale: float | None = None) -> InsideMesh | 
 def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh:
     """A fit with what fits of the vertices taken off, and its verdict; c was in this unit."""
     exact = fit.misfit <= EXACT
-    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
-    enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
-    last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
-    held = rim.inside
-    for _ in range(_ROUNDS if exact else 0):  # what few entries hold is one of many places, and may stop the others
-        before = rim.whole.sum()
-        if before < enough:
-            fit, rim = _grown(problem, fit, rim, held, enough)
+    if exact:
+        enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
+        if rim.whole.sum() < enough:
+            fit, rim = _grown(problem, fit, rim)
+        last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
         fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
+    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
+    if exact:
         known, entries = determined(problem, fit.z, fit.scale, rim.whole)
-        if rim.whole.sum() == before or np.array_equal(known, rim.inside):
-            break
-        held = known
     scale, region = np.atleast_1d(fit.scale) * unit, problem.region
     region = np.zeros(len(problem.piece.triangles), np.int64) if region is None else region
     if entries.sum() <= unknowns(known, 0 if problem.known_scale is not None else len(scale)):
@@ -175,15 +171,14 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
     return fit
 
 
-def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray, enough: float) -> tuple[Fit, Rim]:
-    """What grows from vertices (n,) of a core, up to so many entries, and fits as a whole; else the core."""
+def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
+    """What grows from vertices that a core determines, and fits as a whole; else the core."""
+    piece, held = problem.piece, determined(problem, core.z, core.scale, rim.whole)[0]
     every = replace(rim, left=np.ones_like(rim.left))
-    z, known = grow(problem, core.z, core.scale, every.whole, held, enough)
+    z, known = grow(problem, core.z, core.scale, every.whole, held)
     if known.sum() == held.sum():
         return core, rim
-    corners = problem.piece.triangles
-    new = known[corners].all(axis=1) & (known & ~held)[corners].any(axis=1)
-    grown = replace(rim, left=rim.left & held[corners].all(axis=1) | new)
-    several = FitOptions(last_steps=3, trials=1, damping=1e-15, exact=1e-14)  # what was near by itself is not in all
+    grown = replace(rim, left=np.asarray(known[piece.triangles].all(axis=1)))
+    several = FitOptions(last_steps=3, trials=1, damping=1e-15, exact=0.0)  # what was near by itself is not in all
     fit = problem.fit(z, core.scale, grown.whole, 0.0, several)
     return (fit, grown) if fit.misfit <= EXACT else (core, rim)

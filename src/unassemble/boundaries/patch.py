@@ -1,8 +1,8 @@
 """Levenberg-Marquardt where only vertices near the rim move, each place by itself.
 
 Vertices that no entry ties together have nothing to do with each other, and one place that comes to no end must not
-hold up the others: each connected component has its damping, its line search and its sum of squares. Where a step does
-not bring it near its end, as Newton's method does, each neighbourhood takes its part of the step or leaves it.
+hold up the others: each connected component has its damping, its line search and its sum of squares. In a component
+steps end before triangles turn over, in the neighbourhood of these only.
 """
 
 from __future__ import annotations
@@ -51,12 +51,6 @@ class Patch:
         )  # fmt: skip
         return cls(part, vertices, edges, chosen, free[vertices])
 
-    def of(self, problem: WholeEntries, scale: Scale) -> WholeEntries:
-        """The same problem here, c as it is."""
-        region = None if problem.region is None else problem.region[self.triangles]
-        given, guessed = problem.weights[self.edges], problem.guessed[self.edges]
-        return WholeEntries(self.piece, given, guessed, scale, self.free, region)
-
 
 def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
     """(n,) edges from the nearest of some vertices, (n,) bool; `most` + 1 beyond that."""
@@ -96,7 +90,10 @@ def fit_near(
     has random triangles.
     """
     patch = Patch.about(problem.piece, free)
-    part, moved = patch.of(problem, scale), z.copy()
+    region = None if problem.region is None else problem.region[patch.triangles]
+    given, guessed = problem.weights[patch.edges], problem.guessed[patch.edges]
+    part = WholeEntries(patch.piece, given, guessed, scale, patch.free, region)
+    moved = z.copy()
     try:
         for mu, steps in schedule:
             moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps, rng)
@@ -143,23 +140,20 @@ def _fitted(
     entry, side, triangle = (
         label[corners].max(axis=0) for corners in (piece.stencil, prior.corners, piece.triangles.T)
     )
-    fitted = (whole[piece.opposite] | (mu > 0)).any(axis=1)
+    fitted = (triangle >= 0) & (whole[piece.opposite] | (mu > 0)).any(axis=1)
     triangles, triangle = piece.triangles[fitted], triangle[fitted]
 
     def costs(misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
-        """(count + 1,) sums of squares of each component, and of all that depends on vertices that stay, too.
-
-        The latter holds no step up: what is a minimum with them need not be a solution, and steps lead out of it.
-        """
+        """(count + 1,) sums of squares of each component, and of what stays."""
         entries, sides = (np.bincount(own, some**2, count + 1) for own, some in ((entry, misfit), (side, shape)))
         return np.asarray(entries + sides)
 
     damping = np.full(count + 1, 1e-3)
     misfit, shape = part.residuals(z, scale, whole, prior, mu)
     for _ in range(steps):
-        cost = costs(misfit, shape)
-        if (cost <= 1e-27).all():
+        if not (np.abs(misfit) > 1e-14).any():
             break
+        cost = costs(misfit, shape)
         system = System(part, z, scale, whole, prior, mu, misfit, shape)
         found = part.step(system, np.append(damping[label[part.free]], 1.0)[: part.columns])
         if found is None:
@@ -168,14 +162,6 @@ def _fitted(
         step, limit, share = found[0], np.ones(len(z)), np.ones(count + 1)
         np.minimum.at(limit, triangles.ravel(), np.repeat(0.9 * first_flips(triangles, z, step), 3))
         step *= spread(piece, limit, np.minimum, 3)
-        flips = first_flips(triangles, z, step)
-        np.minimum.at(share, triangle, np.where(flips < 1, 0.9 * flips, 1.0))
-        with np.errstate(all="ignore"):
-            new, new_shape = part.residuals(z + share[label] * step, scale, whole, prior, mu)
-            slow = ~(costs(new, new_shape) < 0.25 * cost)
-            before, after = (_near(piece, prior, m, s) for m, s in ((misfit, shape), (new, new_shape)))
-        refused = spread(piece, slow[label] & ~(after < before) & ((before > 1e-28) | ~(after < 1e-26)), np.maximum, 2)
-        step[refused] = 0
         flips = first_flips(triangles, z, step)
         np.minimum.at(share, triangle, np.where(flips < 1, 0.9 * flips, 1.0))
         better = np.arange(count + 1) == count
@@ -191,18 +177,6 @@ def _fitted(
         damping = np.clip(np.where(better, damping, 10 * damping), 1e-14, 1e6)
         misfit, shape = part.residuals(z, scale, whole, prior, mu)
     return z
-
-
-def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
-    """(n,) sums of squares of entries, and of the prior, up to two edges from each vertex."""
-    n = piece.n_vertices
-    total = np.zeros(n)
-    for ends, squares in ((piece.stencil, misfit**2), (prior.corners, shape**2)):
-        for end in ends:
-            total += np.bincount(end, squares, n)
-    one, other = piece.edges.T
-    near: NDArray[np.float64] = total + np.bincount(one, total[other], n) + np.bincount(other, total[one], n)
-    return near
 
 
 def _components(part: WholeEntries, entries: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
