@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
 from .first import first_fits, nearest_conformal
 from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .grow import grow
 from .judge import determined, unknowns
 from .lengths import fit_lengths
-from .patch import fit_anew, nearest
+from .patch import distance, fit_anew, fit_near, nearest
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -84,8 +85,14 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
     exact = fit.misfit <= EXACT
     if exact:
         enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
+        before, held = 0, rim.inside
+        while before < rim.whole.sum() < enough:  # from a larger core to one larger still
+            if before:
+                held = determined(problem, fit.z, fit.scale, rim.whole)[0]
+            before = rim.whole.sum()
+            fit, rim = _grown(problem, fit, rim, held)
         if rim.whole.sum() < enough:
-            fit, rim = _grown(problem, fit, rim)
+            fit, rim = _grown_by_sets(problem, fit, rim)
         last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
         fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
@@ -149,10 +156,10 @@ def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: floa
     return fit, rim
 
 
-def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Rim | None:
+def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
-    return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)))
+    return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)), keep)
 
 
 def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
@@ -171,8 +178,50 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
     return fit
 
 
-def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
-    """What grows from vertices that a core determines, and fits as a whole; else the core."""
+def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) -> tuple[Fit, Rim]:
+    """A core that fits, and what fits of the other vertices: by themselves first, then with those that are held.
+
+    Best held, (n,) bool, are those that the core determines: what fits elsewhere in it is one of many.
+    """
+    piece, z, movable = problem.piece, core.z, ~held
+    keep = np.logical_not(movable[piece.triangles].any(axis=1))
+    folded = np.zeros(piece.n_vertices, dtype=bool)
+    folded[piece.triangles[areas(piece, z) <= 0]] = True
+    grown = Rim(piece, rim.given, keep | ~folded[piece.triangles].any(axis=1))
+    free = movable
+    for _ in range(24):
+        if not free.any():
+            break
+        z = fit_near(problem, z, core.scale, grown.whole, free, ((1e-5, 5), (0.0, 20)))
+        misfit = np.abs(problem.misfits(z, core.scale))
+        relative = misfit / weight_roundings(piece, z)
+        bad = grown.whole & ~(relative <= 1e-12)
+        _log.debug("grown to %d whole entries: %d do not fit", grown.whole.sum(), bad.sum())
+        if not bad.any():
+            break
+        less = grown.peeled(np.where(bad, relative, 0.0), 0.0, keep=keep)
+        if less is None or not less.whole.any():
+            return core, rim
+        near = np.zeros(piece.n_vertices, dtype=bool)
+        near[piece.edges[bad]] = True
+        grown, free = less, movable & (distance(piece, near, 3) <= 3)
+        if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
+            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+            if fit.misfit <= EXACT:
+                return fit, grown
+    for _ in range(4):
+        fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+        if fit.misfit <= EXACT:
+            return fit, grown
+        less = _less(problem, grown, fit, 0.25, keep=keep)
+        if less is None:
+            break
+        grown = less
+    return core, rim
+
+
+def _grown_by_sets(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
+    """What grows by small sets from vertices that a core determines, and fits as a whole; else the core."""
     piece, held = problem.piece, determined(problem, core.z, core.scale, rim.whole)[0]
     every = replace(rim, left=np.ones_like(rim.left))
     z, known = grow(problem, core.z, core.scale, every.whole, held)

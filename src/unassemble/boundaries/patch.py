@@ -1,8 +1,7 @@
-"""Levenberg-Marquardt where only vertices near the rim move, each place by itself.
+"""Levenberg-Marquardt where only vertices near the rim move, each with a damping of its own.
 
-Vertices that no entry ties together have nothing to do with each other, and one place that comes to no end must not
-hold up the others: each connected component has its damping, its line search and its sum of squares. In a component
-steps end before triangles turn over, in the neighbourhood of these only.
+Far from each other they have nothing to do with each other, and one place that comes to no end must not hold up the
+others: each vertex has a damping, and a step counts where it lowers the squares of the entries near.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece
-from ..topology.numbering import connected
 from .fit import Scale, System, WholeEntries, first_flips
 from .shape import ShapePrior
 
@@ -136,55 +134,46 @@ def _fitted(
     prior = ShapePrior.of(piece, ~whole).about(part.free)
     prior = prior if rng is None else prior.unlike(rng)
     whole = whole & part.asked
-    label, count = _components(part, whole | (mu > 0))
-    entry, side, triangle = (
-        label[corners].max(axis=0) for corners in (piece.stencil, prior.corners, piece.triangles.T)
-    )
-    fitted = (triangle >= 0) & (whole[piece.opposite] | (mu > 0)).any(axis=1)
-    triangles, triangle = piece.triangles[fitted], triangle[fitted]
-
-    def costs(misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
-        """(count + 1,) sums of squares of each component, and of what stays."""
-        entries, sides = (np.bincount(own, some**2, count + 1) for own, some in ((entry, misfit), (side, shape)))
-        return np.asarray(entries + sides)
-
-    damping = np.full(count + 1, 1e-3)
+    fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
+    damping = np.full(len(z), 1e-3)
     misfit, shape = part.residuals(z, scale, whole, prior, mu)
     for _ in range(steps):
         if not (np.abs(misfit) > 1e-14).any():
             break
-        cost = costs(misfit, shape)
         system = System(part, z, scale, whole, prior, mu, misfit, shape)
-        found = part.step(system, np.append(damping[label[part.free]], 1.0)[: part.columns])
+        found = part.step(system, np.append(damping[part.free], 1.0)[: part.columns])
         if found is None:
             damping *= 100
             continue
-        step, limit, share = found[0], np.ones(len(z)), np.ones(count + 1)
-        np.minimum.at(limit, triangles.ravel(), np.repeat(0.9 * first_flips(triangles, z, step), 3))
+        step, _ = found
+        limit = np.ones(len(z))
+        np.minimum.at(limit, fitted.ravel(), np.repeat(0.9 * first_flips(fitted, z, step), 3))
         step *= spread(piece, limit, np.minimum, 3)
-        flips = first_flips(triangles, z, step)
-        np.minimum.at(share, triangle, np.where(flips < 1, 0.9 * flips, 1.0))
-        better = np.arange(count + 1) == count
-        for _ in range(4):
-            there = np.where(better[label], z, z + share[label] * step)
+        there = z + step
+        with np.errstate(all="ignore"):
+            new, new_shape = part.residuals(there, scale, whole, prior, mu)
+        before, after = (_near(piece, prior, m, s) for m, s in ((misfit, shape), (new, new_shape)))
+        worse = ~(after < before) & ((before > 1e-28) | ~(after < 1e-26))
+        worse[fitted[first_flips(fitted, z, step) < 1]] = True
+        refused = spread(piece, worse, np.maximum, 2)
+        there = np.where(refused, z, there)
+        if (first_flips(fitted, z, there - z) < 1).any():  # between what was taken and what was not
+            refused[:] = True
+        else:
+            z = there
             with np.errstate(all="ignore"):
-                now = costs(*part.residuals(there, scale, whole, prior, mu))
-            taken = ~better & ((now < cost) | (now < 1e-26))
-            z = np.where(taken[label], there, z)
-            damping[taken] *= np.where(share[taken] == 1, 0.1, 1.5)
-            better |= taken
-            share *= 0.4
-        damping = np.clip(np.where(better, damping, 10 * damping), 1e-14, 1e6)
-        misfit, shape = part.residuals(z, scale, whole, prior, mu)
+                misfit, shape = part.residuals(z, scale, whole, prior, mu)
+        damping = np.where(refused, np.minimum(10 * damping, 1e6), np.maximum(damping / 10, 1e-14))
     return z
 
 
-def _components(part: WholeEntries, entries: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
-    """(n,) which of so many a moving vertex is in, tied by entries (e,) to others; that number of those that stay."""
-    n, stencil = part.piece.n_vertices, part.piece.stencil[:, entries]
-    one, other = np.concatenate([stencil[[a, b]] for a in range(4) for b in range(a)], axis=1)
-    both = part.free[one] & part.free[other]
-    used, place = np.unique(connected(n, one[both], other[both])[1][part.free], return_inverse=True)
-    label = np.full(n, len(used))
-    label[part.free] = place
-    return label, len(used)
+def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
+    """(n,) sums of squares of entries, and of the prior, up to two edges from each vertex."""
+    n = piece.n_vertices
+    total = np.zeros(n)
+    for ends, squares in ((piece.stencil, misfit**2), (prior.corners, shape**2)):
+        for end in ends:
+            total += np.bincount(end, squares, n)
+    one, other = piece.edges.T
+    near: NDArray[np.float64] = total + np.bincount(one, total[other], n) + np.bincount(other, total[one], n)
+    return near

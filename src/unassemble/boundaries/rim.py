@@ -93,10 +93,10 @@ class Rim:
         left = self.left & ~self.opened[self.piece.triangles].any(axis=1)
         return Rim(self.piece, self.given, left).pruned()
 
-    def peeled(self, misfit: NDArray, least: float) -> Rim | None:
+    def peeled(self, misfit: NDArray, least: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
         """Without the vertices of the rim that are nearest to peaks of misfits (e,); None where there are none.
 
-        Peaks are larger than `least`, and than all others near.
+        Triangles marked in `keep`, (m,) bool, stay. Peaks are larger than `least`, and than all others near.
         """
         piece, opened, reach = self.piece, self.opened, 6
         rest = np.where(self.whole, misfit, 0.0)
@@ -110,7 +110,7 @@ class Rim:
         np.minimum.at(first, label[reached], far[reached])
         gone = np.zeros(piece.n_vertices, dtype=bool)
         gone[reached] = far[reached] <= first[label[reached]]
-        left = self.left & ~gone[piece.triangles].any(axis=1)
+        left = self.left & (~gone[piece.triangles].any(axis=1) | (False if keep is None else keep))
         return Rim(piece, self.given, left) if (left != self.left).any() else None
 
 
