@@ -36,7 +36,7 @@ def recover_lattice(
     other rows of the matrix, entries and diagonal. That such a mesh exists is proved by this; but others may as well,
     with cells that are not alike, or no rectangles.
     """
-    if matrix.adds_up.all() or options.method != "conformal":
+    if matrix.adds_up.all() or options.method != "conformal" or options.noise is not None:
         return None
     n, tensor = matrix.n, placement.tensor
     kept = np.bincount(matrix.edges.ravel(), minlength=n) > 0  # others are rows of the identity

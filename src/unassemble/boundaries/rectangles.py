@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..topology.keys import found, pair_keys
 from .grid import Grid
 
@@ -63,7 +63,7 @@ def steps(
             rim = (grid.step == along) & (start[:, axis] == line)
             other = sizes[along][1 + start[rim, along]]
             rest = matrix.entries[rim] / c - number[rim] * _part(sizes[axis][next_to] / other, bilinear=bilinear)
-            gone = np.abs(rest) > CERTIFIED * np.abs(matrix.entries[rim] / c)
+            gone = np.abs(rest) > ALIKE * np.abs(matrix.entries[rim] / c)
             size = other * (1.5 * (np.sqrt(rest**2 + 2 / 9) - rest) if bilinear else -2 * rest)
             sizes[axis][end] = np.median(size[gone]) if gone.any() else sizes[axis][next_to]
     return float(c), sizes[0], sizes[1]
