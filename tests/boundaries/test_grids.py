@@ -1,5 +1,7 @@
 """Grids of rectangles, alike or not, with Dirichlet conditions of every kind; scikit-fem assembles."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -156,3 +158,19 @@ def test_one_wrong_number(element, which):
     except RecoveryError:
         return
     assert not found.certified
+
+
+@pytest.mark.parametrize("element", ["P1", "Q1"])
+@pytest.mark.parametrize("factor", [-1.0, 1e10, -1e10])
+def test_entries_of_no_rectangles(element, factor):
+    """Of other signs or sizes along every second line, or the first one: no warning, and no grid."""
+    matrix, mesh = assembled(element, UNIFORM)
+    inside = mesh.interior_nodes()
+    x, y = mesh.p[:, inside]
+    matrix = sp.coo_array(matrix[inside][:, inside])
+    row, column = matrix.coords
+    along = (x[row] == x[column]) & (row != column)
+    some = along & (np.rint(np.minimum(y[row], y[column]) / 0.7) % 2 == 0) if factor == -1.0 else along & (x[row] == 1)
+    changed = sp.csr_array((np.where(some, factor * matrix.data, matrix.data), (row, column)), shape=matrix.shape)
+    with suppress(RecoveryError):
+        assert not recover(changed).certified

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..tolerances import CERTIFIED, ROUNDED
-from ..topology.keys import found, pair_keys
+from ..topology.keys import Grouped, found, pair_keys
 from .grid import Grid
 from .rectangles import steps
 
@@ -177,7 +177,7 @@ def _present(
     rest = matrix.diagonal - _sums(cells, diagonal, present, n)
     mass = np.broadcast_to(area[:, None], cells.shape)
     inside = _sums(cells, mass, present, n)
-    density = np.median((rest / inside)[~missing]) if not missing.all() else 0.0
+    density = np.median(rest[~missing] / inside[~missing]) if not missing.all() else 0.0
     if (np.abs(density * inside) > tolerance)[~missing].any():
         diagonal += density * mass
         rest -= density * inside
@@ -185,8 +185,12 @@ def _present(
         density = 0.0
     present[alone] = (np.abs(rest - _sums(cells, diagonal, alone, n)) <= tolerance)[cells[alone].min(axis=1)]
     # Where a boundary that is gone meets one that is not, some of them.
-    for row in np.flatnonzero(np.abs(rest - _sums(cells, diagonal, present & alone, n)) > tolerance).tolist():
-        here, corner = np.nonzero((cells == row) & alone[:, None])
+    which = np.flatnonzero(alone)
+    at_row = Grouped(cells[which].min(axis=1), n)
+    wrong = np.abs(rest - _sums(cells, diagonal, present & alone, n)) > tolerance
+    for row in np.flatnonzero(wrong & (np.diff(at_row.start) > 0)).tolist():
+        here = which[at_row.order[at_row.start[row] : at_row.start[row + 1]]]
+        corner = cells[here].argmin(axis=1)
         for chosen in product((False, True), repeat=len(here)):
             if abs(rest[row] - diagonal[here, corner] @ chosen) <= tolerance[row]:
                 present[here] = chosen

@@ -64,8 +64,11 @@ def steps(
             other = sizes[along][1 + start[rim, along]]
             rest = matrix.entries[rim] / c - number[rim] * _part(sizes[axis][next_to] / other, bilinear=bilinear)
             gone = np.abs(rest) > ALIKE * np.abs(matrix.entries[rim] / c)
-            size = other * (1.5 * (np.sqrt(rest**2 + 2 / 9) - rest) if bilinear else -2 * rest)
+            root = np.sqrt(rest**2 + 2 / 9) + np.abs(rest)
+            size = other * (1.5 * np.where(rest > 0, 2 / (9 * root), root) if bilinear else -2 * rest)
             sizes[axis][end] = np.median(size[gone]) if gone.any() else sizes[axis][next_to]
+    if not all((own > 0).all() for own in sizes):
+        return None
     return float(c), sizes[0], sizes[1]
 
 
@@ -77,7 +80,7 @@ def _part(ratio: NDArray[np.float64], *, bilinear: bool) -> NDArray[np.float64]:
 def _factors(
     i: NDArray[np.int64], j: NDArray[np.int64], value: NDArray[np.float64], n: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]] | None:
-    """Steps a (n,), lines j and b there, with values b[j] / a[i]: up to a factor; None unless they are joined."""
+    """Steps a (n,), lines j and b there, with values b[j] / a[i]: up to a factor; None unless joined and positive."""
     lines, j = np.unique(j, return_inverse=True)
     pairs = sp.csr_array((value, (i, n + j)), shape=(n + len(lines), n + len(lines)))
     order, before = csgraph.breadth_first_order(pairs, 0, directed=False)
@@ -89,5 +92,7 @@ def _factors(
     for node, parent, ratio in zip(later.tolist(), before[later].tolist(), known.tolist(), strict=True):
         size[node] = size[parent] * ratio if node >= n else size[parent] / ratio
     a, b = np.array(size[:n]), np.array(size[n:])
+    if not ((a > 0).all() and (b * b[0] > 0).all()):
+        return None
     fits = np.abs(b[j] / a[i] - value) <= CERTIFIED * np.abs(value)
     return (a, lines, b) if fits.all() else None
