@@ -13,7 +13,7 @@ from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .grow import grow
 from .judge import determined, unknowns
 from .lengths import fit_lengths
-from .patch import distance, fit_anew, fit_near, nearest
+from .patch import distance, fit_anew, fit_near, moved_along
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -133,10 +133,7 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
         bare = less
     else:
         return None
-    inside = bare.inside
-    _, label = nearest(problem.piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
-    moved = np.where(inside, found.z, fit.z + (found.z - fit.z)[label])  # the rim as the nearest vertex inside
-    return replace(found, z=moved), bare
+    return replace(found, z=moved_along(problem.piece, fit.z, found.z, bare.inside)), bare
 
 
 def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: float) -> tuple[Fit, Rim]:

@@ -95,6 +95,11 @@ class Lattice:
         return cls(grid.neighbours, rectangles is not None, scale, z[used], cells, beyond.tocsr(), added)
 
 
+def sides_of(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(s, 2) ends i < j of the sides of cells (m, k), each side once."""
+    return np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
+
+
 def _rectangles(
     matrix: OperatorMatrix, grid: Grid, at: NDArray[np.int64], cells: NDArray[np.int64]
 ) -> tuple[float, NDArray[np.complex128], NDArray[np.float64]] | None:

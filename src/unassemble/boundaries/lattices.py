@@ -21,7 +21,7 @@ from ..topology import Topology
 from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
-from .lattice import Lattice
+from .lattice import Lattice, sides_of
 from .seats import seated
 
 _RULE = "2 x 2 Gauss"
@@ -154,7 +154,7 @@ def _topology(
     triangles = _divided(cells)
     known = matrix.edges[np.isin(matrix.edges, cells).all(axis=1) & np.isin(matrix.edges, own).any(axis=1)]
     if bilinear:  # without diagonals
-        known = np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
+        known = sides_of(cells)
     edges, given, opposite = with_sides(n, known, triangles)
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None or len(pieces) != 1 or len(pieces[0].edges) < len(edges):

@@ -28,7 +28,7 @@ from ..tolerances import LAST_DIGITS, ROUNDED, SUMMED
 from ..topology.pieces import planar_pieces
 from .first import SLOWLY
 from .fit import Fit, FitOptions, WholeEntries
-from .patch import nearest
+from .patch import moved_along
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -83,11 +83,9 @@ def fit_lengths(
             here = lengths.flat(here, fading, free_scale=problem.known_scale is None)
             if here.bent <= ROUNDED:
                 found = _laid_out(rim, lengths.edges, here.weights, z)
-                return (
-                    None
-                    if found is None
-                    else (problem.fit(found[0], here.scale, found[1].whole, 0.0, newton), found[1])
-                )
+                if found is None:
+                    return None
+                return problem.fit(found[0], here.scale, found[1].whole, 0.0, newton), found[1]
         except (GeometryError, SolverError):
             return None
         finally:
@@ -121,11 +119,9 @@ def _laid_out(
     inside[here] = True
     found = z.copy()
     found[here] = similarity[0](flat)
-    _, label = nearest(piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
-    found = np.where(inside, found, z + (found - z)[label])
     own = np.zeros(len(piece.edges), dtype=bool)
     own[edges[part.edge_rows]] = True
-    return found, replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
+    return moved_along(piece, z, found, inside), replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
 
 
 class _Lengths:

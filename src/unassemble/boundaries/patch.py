@@ -55,6 +55,14 @@ def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np
     return nearest(piece, np.where(vertices, 0, -1), most)[0]
 
 
+def moved_along(
+    piece: Piece, z: NDArray[np.complex128], there: NDArray[np.complex128], inside: NDArray[np.bool_]
+) -> NDArray[np.complex128]:
+    """(n,) the positions `there` of vertices inside, (n,) bool, and z of the others moved as the nearest of these."""
+    _, label = nearest(piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
+    return np.where(inside, there, z + (there - z)[label])
+
+
 def nearest(piece: Piece, label: NDArray[np.int64], most: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(n,) edges from the nearest vertex with a label, of labels (n,) from 0 and -1 elsewhere, and this label."""
     far, label = np.where(label >= 0, 0, most + 1), label.copy()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..matrix import OperatorMatrix
 from ..tolerances import CERTIFIED
 from ..topology.keys import contains
-from .lattice import Lattice
+from .lattice import Lattice, sides_of
 
 
 def seated(
@@ -68,7 +68,7 @@ def _by_neighbours(
     As they were where neighbours that are stored are none in the lattice.
     """
     new, firm = row.copy(), status.copy()
-    ends = np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
+    ends = sides_of(cells)
     ends = ends[(ends >= k).all(axis=1)]
     stored = matrix.edges[~np.isin(matrix.edges, row[:k]).any(axis=1)]
     label = np.random.default_rng(0).integers(1, 2**40, matrix.n)
