@@ -58,6 +58,7 @@ class _Metric:
         return float(self.curvature @ self.curvature + mu**2 * (self.bulge @ self.bulge))
 
 
+@np.errstate(all="ignore")  # a step of a problem without answer may be of any size, and ends as no metric
 def fit_lengths(
     problem: WholeEntries, rim: Rim, z: NDArray[np.complex128], newton: FitOptions
 ) -> tuple[Fit, Rim] | None:
@@ -224,11 +225,10 @@ class _Lengths:
         move, more = self._towards_flat(here, mu, damping, free_scale=free_scale)
         share = min(1.0, 1.5 / max(float(np.abs(move[~self.whole]).max(initial=0.0)), 1e-300))
         scale = here.scale * float(np.exp(np.clip(share * more, -1, 1)))
-        with np.errstate(all="ignore"):
-            for some in (True, ~self.whole):
-                found = self.convex(here.u * np.exp(np.where(some, share * move, 0.0)), scale)
-                if found is not None:
-                    return found
+        for some in (True, ~self.whole):
+            found = self.convex(here.u * np.exp(np.where(some, share * move, 0.0)), scale)
+            if found is not None:
+                return found
         return None
 
     def _towards_flat(self, here: _Metric, mu: float, damping: float, *, free_scale: bool) -> tuple[NDArray, float]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -86,9 +86,17 @@ def _beside(problem: WholeEntries, whole: NDArray[np.bool_]) -> tuple[NDArray[np
 class _Shares:
     """What columns say of a misfit once displacements and factors have taken up what they can."""
 
-    between: NDArray[np.float64]  # (k,) numbers between 0 and 1 of all columns together
     along: NDArray[np.float64]  # (k,) products of what is left of each column with the misfit
-    gram: NDArray[np.float64]  # (k, k) and with what is left of all columns
+    gram: NDArray[np.float64]  # (k, k) products of what is left of any two columns
+
+    @cached_property
+    def between(self) -> NDArray[np.float64]:
+        """(k,) Numbers between 0 and 1 of all columns together."""
+        value, vector = np.linalg.eigh((self.gram + self.gram.T) / 2)
+        if not value.max(initial=0.0) > 0:  # displacements and factors take all of them up
+            return np.zeros(len(self.along))
+        root = np.sqrt(np.maximum(value, 1e-8 * value.max()))
+        return np.asarray(lsq_linear((vector * root).T, (vector / root).T @ self.along, bounds=(0, 1)).x)
 
     @property
     def square(self) -> NDArray[np.float64]:
@@ -112,7 +120,7 @@ class _Shares:
     ) -> _Shares:  # fmt: skip
         """Of columns with entries (k, 3) at sides (k, 3)."""
         count = len(column)
-        none = cls(np.zeros(count), np.zeros(count), np.zeros((count, count)))
+        none = cls(np.zeros(count), np.zeros((count, count)))
         if not count:
             return none
         added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(misfit)))
@@ -133,11 +141,4 @@ class _Shares:
             some = slice(first, first + 32)
             gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
         gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
-        if not np.isfinite(gram).all():
-            return none
-        value, vector = np.linalg.eigh((gram + gram.T) / 2)
-        if not value.max() > 0:  # displacements and factors take all of them up
-            return none
-        root, right = np.sqrt(np.maximum(value, 1e-8 * value.max())), added @ misfit
-        between = lsq_linear((vector * root).T, (vector / root).T @ right, bounds=(0, 1)).x
-        return cls(between, right, gram)
+        return cls(added @ misfit, gram) if np.isfinite(gram).all() else none
