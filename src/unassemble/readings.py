@@ -21,7 +21,7 @@ from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .conforming.roles import Cells
 from .errors import GeometryError, RecoveryError
-from .further_terms import less_mass, recover_elements_with_terms, recover_with_terms
+from .masses import less_mass, recover_elements_with_terms, recover_with_terms
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh

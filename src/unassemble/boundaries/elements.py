@@ -26,9 +26,8 @@ from ..scalar.placement import Placement
 from ..tolerances import CERTIFIED, ROUNDED
 from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
-from ..words import count_of
 from .guessed import FittedPart, fitted_part
-from .judge import node_status, unknowns
+from .judge import node_status, partly, unknowns
 
 _MOST = 3  # sets of cells, the likeliest ones
 
@@ -45,8 +44,7 @@ def recover_partial_elements(
     lost = matrix.incomplete_rows if matrix.replaced is None else matrix.replaced
     if not lost.any():
         return None
-    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
-    scale = None if options.scale is None else options.scale * stretch
+    scale = None if options.scale is None else options.scale * placement.stretch
     for cells in islice(shown_cells(matrix, lost=lost), _MOST):
         with clock("inside"):
             try:
@@ -96,23 +94,14 @@ def _report(
         claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
     if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None
-    known, plausible = int((status == 0).sum()), int((status == 2).sum())
-    notes = [*matrix.warnings, *said, *mesh.notes]
-    if plausible:
-        notes.append(f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2)")
+    fields, loose = partly(status, len(pairs), error)
+    notes = [*matrix.warnings, *said, *mesh.notes, *loose]
     if options.standard_deviations:
         notes.append("error bars are not computed where cells of these elements are lost")
     return ConformingMesh(
         **mesh.fields(),
-        node_status=status,
-        status="certified",
-        uniqueness="searched",
-        reason=(
-            f"{known:,} of {matrix.n:,} points are determined by {len(pairs):,} whole entries, which the operator "
-            f"re-assembled on them gives back to {error:.1e} (relative)"
-        ),
+        **fields,
         operator=placement.operator,
-        backward_error=error,
         timings=clock.timings,
         warnings=tuple(notes),
     )

@@ -61,7 +61,7 @@ def recover_lattice(
         z = np.full(n + int((row >= n).sum()), np.nan, dtype=np.complex128)
         z[row] = lattice.z
         placed, notes = placement.apply(piece, z[piece.vertices])
-        mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / (tensor.root_determinant if tensor else 1)]))
+        mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / placement.stretch]))
         design = np.column_stack([z.real, z.imag, np.ones(len(z))])
         gone = design[n:] @ np.linalg.lstsq(design[piece.vertices], mesh.points[piece.vertices], rcond=None)[0]
     with clock("certify"):

@@ -196,7 +196,8 @@ class _Lengths:
             self.left -= 1
             move = np.zeros(len(u))
             move[free] = self._convex.solve(np.ascontiguousarray(rest * u[free]))
-            step = min(1.0, 0.95 * longest_step(u[self.sides], (u * move)[self.sides]), 0.9 / max(-move.min(), 1e-300))
+            longest = longest_step(u[self.sides], (u * move)[self.sides]).min()
+            step = min(1.0, 0.95 * longest, 0.9 / max(-move.min(), 1e-300))
             u = u * (1 + step * move)
         return None
 

@@ -24,9 +24,8 @@ from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
-from ..words import count_of
 from .inside import InsideMesh, PieceEntries, fit_inside
-from .judge import node_status, unknowns
+from .judge import node_status, partly, unknowns
 
 Meshes = Sequence[InsideMesh | None]
 
@@ -69,8 +68,7 @@ def recover_partial(
         topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
     if not topology.pieces:
         return None
-    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
-    scale = None if options.scale is None else options.scale * stretch
+    scale = None if options.scale is None else options.scale * placement.stretch
     with clock("inside"):
         given: list[PieceEntries] = []
         for piece in topology.pieces:
@@ -85,7 +83,7 @@ def recover_partial(
     if whole is None and all(mesh is None or _nothing_gone(piece, matrix, mesh, scale) for piece, mesh in pairs):
         return None
     with clock("place"):
-        placed = _Placed.of(topology, meshes, placement, stretch)
+        placed = _Placed.of(topology, meshes, placement)
     with clock("certify"):
         judged = _Judged.of(matrix, placed, placement, known_scale=scale is not None)
     found = _report(matrix, placed, judged, placement, clock)
@@ -147,15 +145,15 @@ class _Placed:
     notes: list[str]
 
     @classmethod
-    def of(cls, topology: Topology, meshes: Meshes, placement: Placement, stretch: float) -> _Placed:
+    def of(cls, topology: Topology, meshes: Meshes, placement: Placement) -> _Placed:
         """Placed by anchors, or in the canonical frame of each."""
         found = [(piece, mesh) for piece, mesh in zip(topology.pieces, meshes, strict=True) if mesh is not None]
         topology = Topology(topology.n_vertices, topology.edges, tuple(piece for piece, _ in found), topology.method)
         parts = [(piece.vertices, mesh.determined) for piece, mesh in found]
         placement, said = placement.upon(topology.n_vertices, parts)
         placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
-        factor = np.concatenate([mesh.factor for _, mesh in found]) / stretch
-        scale, region = np.array([mesh.scale[0] for _, mesh in found]) / stretch, None
+        factor = np.concatenate([mesh.factor for _, mesh in found]) / placement.stretch
+        scale, region = np.array([mesh.scale[0] for _, mesh in found]) / placement.stretch, None
         if any(len(mesh.scale) > 1 for _, mesh in found):
             scale, region = distinct(factor)
         positions = [z for z, _ in placed]
@@ -227,29 +225,17 @@ def _report(
 ) -> PlanarMesh | None:
     if not (judged.backward_error <= CERTIFIED and judged.spare > 0) or judged.wrong:
         return None
-    known, mesh, topology = int((placed.status == 0).sum()), placed.mesh, placed.topology
-    notes = [*matrix.warnings, *placed.notes]
-    if k := int((placed.status == 2).sum()):
-        notes.append(
-            f"{count_of(k, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to unknowns "
-            "that were taken out, or that other terms share, entries do not determine them"
-        )
+    mesh, topology = placed.mesh, placed.topology
     told = "" if placed.region is None else f", with a factor for each of {len(mesh.scale)} regions,"
+    fields, loose = partly(placed.status, judged.entries, judged.backward_error, told)
     return PlanarMesh(
         **mesh.fields(triangulate=placed.region is not None),
         points=mesh.points,
         region=placed.region,
         hinges=topology.hinges,
-        node_status=placed.status,
-        status="certified",
-        uniqueness="searched",
-        reason=(
-            f"{known:,} of {matrix.n:,} points are determined by {judged.entries:,} whole entries, which the operator "
-            f"re-assembled on them{told} gives back to {judged.backward_error:.1e} (relative)"
-        ),
+        **fields,
         operator=placement.operator,
-        backward_error=judged.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,
-        warnings=tuple(notes),
+        warnings=(*matrix.warnings, *placed.notes, *loose),
     )

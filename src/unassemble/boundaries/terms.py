@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
@@ -110,39 +111,25 @@ class _Loops:
         return terms
 
     def terms(self, matrix: OperatorMatrix, scale: float | None) -> NDArray[np.float64] | None:
-        """(b,) m with which a conformal map has all entries, by Gauss-Newton; None where there is none."""
+        """(b,) m with which a conformal map has all entries, by least squares; None where there is none."""
         terms = self._particular()
         if terms is None:
             return None
-        size = np.diff(self.piece.loop_offsets)
-        even = np.flatnonzero(size % 2 == 0)
-        ways = np.where(self.loop[:, None] == even, self.sign[:, None], 0).astype(float)
-        misfit = self._misfit(matrix, terms, scale)
-        step = ALIKE * float(np.median(np.abs(matrix.entries)))
-        for _ in range(12):
-            if misfit is None or np.abs(misfit).max() <= ROUNDED or not len(even):
-                break
-            others = [self._misfit(matrix, terms + step * way, scale) for way in ways.T]
-            slopes = [(other - misfit) / step for other in others if other is not None]
-            if len(slopes) < len(even):
-                return None
-            move = ways @ np.linalg.lstsq(np.column_stack(slopes), -misfit, rcond=None)[0]
-            moved = None
-            for share in (1.0, 0.3, 0.1):
-                moved = self._misfit(matrix, terms + share * move, scale)
-                if moved is not None and np.linalg.norm(moved) < np.linalg.norm(misfit):
-                    break
-                moved = None
-            if moved is None:
-                break
-            terms, misfit = terms + share * move, moved
-        return terms if misfit is not None and np.abs(misfit).max() <= ALIKE else None
+        even = np.flatnonzero(np.diff(self.piece.loop_offsets) % 2 == 0)
+        ways = np.where(self.loop[:, None] == even, self.sign[:, None], 0) * np.median(np.abs(matrix.entries))
 
-    def _misfit(self, matrix: OperatorMatrix, terms: NDArray, scale: float | None) -> NDArray[np.float64] | None:
-        """(e,) of the conformal map; None where there is none."""
-        weights = -self.without(matrix, terms).entries[self.piece.edge_rows]
-        found = left_by_map(self.piece, weights, scale)
-        return found[1] if found is not None and np.isfinite(found[1]).all() else None
+        def misfit(t: NDArray) -> NDArray[np.float64]:
+            weights = -self.without(matrix, terms + ways @ t).entries[self.piece.edge_rows]
+            found = left_by_map(self.piece, weights, scale)
+            if found is None or not np.isfinite(found[1]).all():
+                return np.full(len(weights), 1 / ALIKE)  # so that no step ends there
+            return found[1]
+
+        left = misfit(np.zeros(len(even)))
+        if len(even):
+            found = least_squares(misfit, np.zeros(len(even)), ftol=None, xtol=ROUNDED, gtol=ROUNDED, max_nfev=12)
+            terms, left = terms + ways @ found.x, found.fun
+        return terms if np.abs(left).max() <= ALIKE else None
 
     def without(self, matrix: OperatorMatrix, terms: NDArray) -> OperatorMatrix:
         """The matrix less these terms."""

@@ -27,6 +27,7 @@ class JoinedParts:
         self.blocks: dict[str, NDArray[np.int64]] = {}
         self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
         self._topology, self._fits, self._tensor = topology, fits, placement.tensor
+        self._stretch = placement.stretch
         nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
         self.placed, self.origins, self.notes = placement.placed(topology, nodes, remarks)
         for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
@@ -63,14 +64,13 @@ class JoinedParts:
             if cells.shape[1] > corners:
                 fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
         boundary, offsets = boundary_loops(self.blocks)
-        stretch = self._tensor.root_determinant if self._tensor else 1.0
         return fields | {
             "points": self.written,
             "boundary": boundary,
             "boundary_offsets": offsets,
             "component": self.component,
             "hinges": self._topology.hinges,
-            "scale": np.array([fit.scale for fit in self._fits]) / stretch,
+            "scale": np.array([fit.scale for fit in self._fits]) / self._stretch,
             "n_holes": sum(fit.part.n_holes for fit in self._fits),
             "quadrature": ", ".join(dict.fromkeys(rule for fit in self._fits for rule in fit.rule.values())),
             "straight": all(fit.straight for fit in self._fits),

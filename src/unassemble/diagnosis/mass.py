@@ -15,10 +15,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from ..elements import exact_rule, shape_functions
 from ..elements.kinds import KINDS, Kind
-from ..elements.reference import mass_sums
 from ..errors import GeometryError
-from ..further_terms import less_mass
+from ..masses import less_mass
 from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
 from ..nodes.unknowns import nodes_of_pattern
@@ -104,7 +104,9 @@ def _simplices(M: sp.csr_array) -> tuple[str, Kind, list[float]] | None:
     diagonal = M.diagonal()
     share = M.sum(axis=1) / diagonal
     for name, kind in _SIMPLICES.items():
-        ratios = np.unique(mass_sums(kind).round(10)).tolist()
+        at, weights = exact_rule(kind, more=1)
+        value = shape_functions(kind, at)
+        ratios = np.unique((weights @ value / (weights @ value**2)).round(10)).tolist()
         apart = np.abs(share[:, None] - ratios) <= SUMMED * abs(M).sum(axis=1)[:, None] / diagonal[:, None]
         if apart.any(axis=1).all() and apart.any(axis=0).all():
             return name, kind, ratios

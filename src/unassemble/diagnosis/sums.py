@@ -29,10 +29,9 @@ class Sums:
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Sums:
         """Those of a matrix."""
-        size = np.bincount(matrix.edges.ravel(), np.repeat(np.abs(matrix.entries), 2), matrix.n)
-        sums, alone = matrix.row_sums, size == 0
+        sums, alone = matrix.row_sums, matrix.couplings == 0
         zero = matrix.adds_up & ~alone
-        penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
+        penalised = (SMALL * np.abs(matrix.diagonal) > matrix.couplings) & ~alone
         rest = ~(zero | alone | penalised)
         signs = np.unique(np.sign(sums[rest]))
         sign = int(signs[0]) if len(signs) == 1 and rest.sum() > MOST * (zero | rest).sum() else 0

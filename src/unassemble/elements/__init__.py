@@ -19,6 +19,7 @@ from .reference import (
     rules,
     shape_functions,
     shape_gradients,
+    volumes,
 )
 from .surface import outer_facets, outer_nodes
 
@@ -39,4 +40,5 @@ __all__ = [
     "rules",
     "shape_functions",
     "shape_gradients",
+    "volumes",
 ]

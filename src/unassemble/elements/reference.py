@@ -11,7 +11,6 @@ from itertools import permutations, product
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.special import factorial
 
 from ..tolerances import LAST_DIGITS
 from .kinds import Kind
@@ -53,19 +52,6 @@ def _coefficients(kind: Kind) -> NDArray[np.float64]:
 def shape_functions(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """(q, k) values of the shape functions at points (q, d) of the reference element."""
     return np.asarray((at[:, None, :] ** _exponents(kind)).prod(axis=2) @ _coefficients(kind))
-
-
-def mass_sums(kind: Kind) -> NDArray[np.float64]:
-    """(k,) sums of the rows of a simplex's mass matrix, over the diagonal: the same on all meshes of straight cells.
-
-    The integral of a monomial over the unit simplex is the product of the factorials of its exponents over that of
-    their sum and d.
-    """
-    power = _exponents(kind)
-    both, C = power[:, None, :] + power, _coefficients(kind)
-    integrals = factorial(both).prod(axis=2) / factorial(both.sum(axis=2) + kind.dim)
-    M = C.T @ integrals @ C
-    return np.asarray(M.sum(axis=1) / M.diagonal())
 
 
 def shape_gradients(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -171,14 +157,16 @@ def _tetrahedron_rules() -> Iterator[Rule]:
     )
 
 
-def mass(points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule) -> NDArray[np.float64]:
-    """(m, k, k) integrals of phi_i phi_j."""
-    at, weights = rule
-    total = np.zeros((len(cells), kind.nodes, kind.nodes))
-    for value, slopes, weight in zip(shape_functions(kind, at), shape_gradients(kind, at), weights, strict=True):
-        size = np.abs(np.linalg.det(points[cells].transpose(0, 2, 1) @ slopes))
-        total += (size * weight)[:, None, None] * np.outer(value, value)
-    return total
+def volumes(points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule) -> NDArray[np.float64]:
+    """(m, q) volumes that go with the points of a rule: its weights times |det J|."""
+    moved = (points[cells] - points[cells[:, :1]]).transpose(0, 2, 1)  # digits of differences, not of coordinates
+    return np.abs(np.linalg.det(moved[:, None] @ shape_gradients(kind, rule[0]))) * rule[1]
+
+
+def mass(kind: Kind, at: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, k, k) integrals of phi_i phi_j, from volumes (m, q) at points (q, d), or masses."""
+    value = shape_functions(kind, at)
+    return np.einsum("mq,qi,qj->mij", weights, value, value, optimize=True)
 
 
 def elasticity(

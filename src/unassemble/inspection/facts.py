@@ -11,7 +11,7 @@ from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
 from ..conforming.recover import shown_cells
 from ..errors import GeometryError, RecoveryError, TopologyError
-from ..further_terms import less_mass
+from ..masses import less_mass
 from ..matrix import OperatorMatrix
 from ..metric.mesh import SurfaceMesh
 from ..nodes.nodal import nodal_matrix, uncoupled

@@ -46,12 +46,14 @@ class OperatorMatrix:
         return sums
 
     @cached_property
+    def couplings(self) -> NDArray[np.float64]:
+        """(n,) sums of the magnitudes of the off-diagonal entries of each row."""
+        return np.asarray(np.bincount(self.edges.ravel(), np.repeat(np.abs(self.entries), 2), self.n))
+
+    @cached_property
     def adds_up(self) -> NDArray[np.bool_]:
         """(n,) rows that add up to zero, as those of a Laplacian do."""
-        size = np.abs(self.diagonal)
-        for end in self.edges.T:
-            size += np.bincount(end, np.abs(self.entries), self.n)
-        return np.asarray(np.abs(self.row_sums) <= SUMMED * size)
+        return np.asarray(np.abs(self.row_sums) <= SUMMED * (np.abs(self.diagonal) + self.couplings))
 
     @property
     def unweighted(self) -> bool:

@@ -27,16 +27,16 @@ def angles(sides: NDArray) -> NDArray[np.float64]:
     return np.arctan2(np.sqrt(heron(sides))[:, None], sides @ _SIGNS)
 
 
-def longest_step(sides: NDArray, change: NDArray) -> float:
-    """The least t > 0 at which sides + t change is a triangle without area: Heron's formula is a quadratic in t."""
+def longest_step(sides: NDArray, change: NDArray) -> NDArray[np.float64]:
+    """(m,) least t > 0 at which sides + t change is a triangle without area: Heron's formula is a quadratic in t."""
 
     def product(a: NDArray, b: NDArray) -> NDArray:
         return a.sum(axis=1) * b.sum(axis=1) - 2 * (a * b).sum(axis=1)
 
     constant, half, square = heron(sides), product(sides, change), product(change, change)
-    slope = np.sqrt(np.maximum(half**2 - constant * square, 0)) - half
-    with np.errstate(divide="ignore"):
-        return float(np.min(np.where(slope > 0, constant / slope, np.inf)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.sqrt(half**2 - constant * square) - half  # not a number where the area never vanishes
+        return np.where(slope > 0, constant / slope, np.inf)
 
 
 def summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:

@@ -115,7 +115,7 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArra
         change = solved[:, 0] - (w @ solved[:, 0]) / (w @ solved[:, 1]) * solved[:, 1]
         if not np.isfinite(change).all():
             break
-        step = min(1.0, 0.95 * longest_step(sides, change[opposite]))
+        step = min(1.0, 0.95 * longest_step(sides, change[opposite]).min())
         u = u + step * change
         if step > 0.5:
             if barrier < 1e-6:  # Newton's method converges from there
@@ -147,5 +147,5 @@ def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: in
         ones = np.ones(len(area))
         change = u * normal.factorised(2 * blocks_of(sides, area, cotangents, ones, -ones), 1e-10).solve(misfit * u)
         change -= u * ((own @ change) / (own @ u))
-        u = u + min(1.0, 0.9 * longest_step(sides, change[opposite])) * change
+        u = u + min(1.0, 0.9 * longest_step(sides, change[opposite]).min()) * change
     return best, history

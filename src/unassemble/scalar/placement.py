@@ -37,6 +37,11 @@ class Placement:
         return (self.tensor.kxx, self.tensor.kxy, self.tensor.kyy) if self.tensor else None
 
     @property
+    def stretch(self) -> float:
+        """sqrt(det K): c div(K grad) is a Laplacian of factor c sqrt(det K), in coordinates that K stretches."""
+        return self.tensor.root_determinant if self.tensor else 1.0
+
+    @property
     def operator(self) -> str:
         """The operator's name."""
         return "anisotropic laplacian" if self.tensor else "laplacian"

@@ -64,7 +64,7 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
             sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
         z, remarks = [mesh.z for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
         placed, origins, notes = task.placement.placed(topology, z, remarks, sizes)
-        mesh = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
+        mesh = JoinedMesh.of(topology, placed, solved.scales / task.placement.stretch)
     with clock("certify"):
         near = _held_against(stored, solved, mesh, mesh.points, task)
         evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)

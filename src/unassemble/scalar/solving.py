@@ -34,14 +34,9 @@ class Task:
     squared_lengths: NDArray[np.float64] | None = None
 
     @property
-    def stretch(self) -> float:
-        """sqrt(det K): c div(K grad) is a Laplacian of factor c sqrt(det K), in coordinates that K stretches."""
-        return self.placement.tensor.root_determinant if self.placement.tensor else 1.0
-
-    @property
     def scale(self) -> float | None:
-        """The factor of that Laplacian, where c is known."""
-        return None if self.options.scale is None else self.options.scale * self.stretch
+        """The factor of the Laplacian, where c is known."""
+        return None if self.options.scale is None else self.options.scale * self.placement.stretch
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,13 @@
 """Which terms a scalar matrix has besides a Laplacian and any diagonal: told by its row sums, tried in order.
 
-S c L S, as Jacobi scaling and equilibration leave it, with an unknown positive diagonal matrix S: L annihilates
-constants, so that this annihilates 1 / S. Where nothing else stands on the diagonal a positive null vector gives S, up
-to a factor that only c could tell it from. With an unknown D there is no such vector, and fewer entries off the
-diagonal than coordinates and factors.
+Rows of c L add up to zero. Where they do not, D is whatever it is if the other entries are those of a Laplacian. If
+they are not, sums of one sign are those of a mass term, and sums of both those of S c L S, as Jacobi scaling and
+equilibration leave it, with an unknown positive diagonal matrix S: L annihilates constants, so that this annihilates
+1 / S. Where nothing else stands on the diagonal a positive null vector gives S, up to a factor that only c could tell
+it from. With an unknown D there is no such vector, and fewer entries off the diagonal than coordinates and factors.
 """
 
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -15,50 +17,88 @@ from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
+from ..conforming.recover import shown_cells
+from ..conforming.roles import Cells
 from ..errors import GeometryError, RecoveryError
 from ..linalg import UpperTriangle, nearly_singular
 from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
-from ..reaction import Skeleton
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, SUMMED
 from ..topology import Topology, surfaces
-from .held import Held, Plain, RowSums
-from .mass import mass_alone, with_consistent_mass, with_lumped_mass
+from .cells import guessed_from_sums
+from .held import Held, Plain
+from .settled import in_one_size, less_mass, settled
+from .triangles import with_consistent_mass, with_lumped_mass
 
 
 def recover_with_terms(
     matrix: OperatorMatrix, plain: Plain, clock: Clock, tensor: tuple[float, float, float] | None = None
 ) -> PlanarMesh:
-    """The mesh of a scalar matrix.
-
-    Rows of c L add up to zero. Where they do not, D is whatever it is if the other entries are those of a Laplacian.
-    If they are not, sums of one sign are those of a mass term, and sums of both those of S c L S.
+    """The mesh of a scalar matrix of linear triangles.
 
     `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
     `tensor`: (kxx, kxy, kyy) to be undone.
     """
-    sums = RowSums(matrix)
-    if not sums.there.any():
+    held, found = Held(matrix, tensor), None
+    if not held.has_sums.any():
         return plain(matrix)
     with clock("topology"):
         topology = surfaces(matrix.n, matrix.edges)
-    held, found = Held(matrix, tensor), None
     # Else sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
     triangles = topology.pieces and not len(topology.bare_edges) and topology.multiplicity.all()
     if triangles:
         with clock("conformal"):
             laplacian = _is_laplacian(matrix, topology)
         if laplacian:
-            return with_lumped_mass(held, plain(matrix), sums) if sums.sign else plain(matrix)
+            return with_lumped_mass(held, plain(matrix)) if held.sign else plain(matrix)
     with suppress(RecoveryError):
-        if not sums.sign:
-            found = unscaled(held, plain, clock)
+        if not held.sign:
+            found = _unscaled(held, plain, clock)
         elif triangles:
-            cells = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
-            found = mass_alone(held, topology, cells, sums) or with_consistent_mass(held, cells, sums, plain, clock)
+            found = with_consistent_mass(held, topology, plain, clock)
     return found or plain(matrix)
+
+
+def recover_elements_with_terms(
+    matrix: OperatorMatrix,
+    of_cells: Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh],
+    clock: Clock,
+    *,
+    anchored: bool,
+) -> PlanarMesh | None:
+    """The mesh of c L + s M or S c L S, of other elements; None where row sums show neither, or nothing comes near.
+
+    `of_cells`: recovers a matrix c L + D on cells that its rows may form; `anchored`: whether positions are given, so
+    that no piece may change its size.
+    """
+    held = Held(matrix)
+    if not held.has_sums.any():
+        return None
+    try:
+        told = less_mass(matrix)
+        cells = told.cells if told else next(shown_cells(matrix), None)
+        if cells is None:
+            return None
+        if not (told or held.sign):
+            scaled = _unscaled(held, lambda left: of_cells(left, shown_cells(left)), clock)
+            if scaled is not None:
+                return scaled
+        # Serendipity functions have integrals of both signs.
+        weights = told.weights if told else guessed_from_sums(matrix.row_sums, cells.blocks)
+        if np.ptp(np.sign(np.concatenate([some.sum(axis=1) for some in weights.values()]))):
+            return None
+
+        def sized(left: OperatorMatrix) -> PlanarMesh:
+            found = of_cells(left, [cells])
+            return found if anchored else in_one_size(found, matrix.row_sums, cells.blocks)
+
+        if told:
+            return settled(held, weights, cells.blocks, sized, patience=0, told=True)
+        return settled(held, weights, cells.blocks, sized)
+    except RecoveryError:
+        return None
 
 
 def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
@@ -71,7 +111,7 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
     return True
 
 
-def unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
+def _unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
     """The mesh of S c L S; None where no positive vector is annihilated."""
     matrix = held.matrix
     with clock("scaling"):

@@ -14,13 +14,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .elements import KINDS, assembled, exact_rule, mass
-from .errors import GeometryError, InputError, MatrixError, RecoveryError
-from .matrix import as_csr, is_file, read_matrix
-from .matrix.digits import Digits
-from .recovery import Body, PlanarMesh, Recovery
-from .tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
-from .words import sentences
+from ..elements import KINDS
+from ..errors import GeometryError, InputError, MatrixError, RecoveryError
+from ..matrix import as_csr, is_file, read_matrix
+from ..matrix.digits import Digits
+from ..recovery import Body, PlanarMesh, Recovery
+from ..tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
+from ..words import sentences
+from .cells import mass_matrix, weights_at
 
 
 def weighed(
@@ -118,19 +119,16 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
             f"mass matrices are read beside those of linear elements on cells that are known, not of {found.operator}"
             + (f" on cells of the kind {other[0]}" if other else "")
         )
-    n, scalar = found.n_points, sp.csr_array((found.n_points,) * 2)
-    for kind, nodes in cells.items():
-        scalar = scalar + assembled(mass(found.points, nodes, KINDS[kind], exact_rule(KINDS[kind], 1)), nodes, n)
+    n, blocks = found.n_points, {KINDS[kind]: nodes for kind, nodes in cells.items()}
+    scalar = mass_matrix(n, blocks, weights_at(found.points, blocks))
     if lumped:
         scalar = sp.csr_array(sp.diags_array(scalar.sum(axis=1)))
     if found.node_of_row is None or found.direction_of_row is None:
         return scalar
-    total, N = sp.csr_array((len(found.node_of_row),) * 2), len(found.node_of_row)
-    for k in range(found.dim):
-        own = np.flatnonzero(found.direction_of_row == k)
-        choose = sp.csr_array((np.ones(len(own)), (own, found.node_of_row[own])), shape=(N, n))
-        total = total + choose @ scalar @ choose.T
-    return sp.csr_array(total)
+    N, alike = len(found.node_of_row), found.direction_of_row[:, None] == np.arange(found.dim)
+    node = sp.csr_array((np.ones(N), (np.arange(N), found.node_of_row)), shape=(N, n))
+    chosen = [sp.diags_array(own.astype(float)) @ node for own in alike.T]
+    return sp.csr_array(sum(one @ scalar @ one.T for one in chosen))
 
 
 def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> float:

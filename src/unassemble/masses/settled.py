@@ -1,32 +1,27 @@
-"""Other elements than linear triangles, with a mass term, or with rows and columns scaled.
+"""A mass term taken off with the areas that are known, or again and again with those of the mesh of what is left.
 
-Where entries tell the areas of cells the mass matrix is taken off before anything is solved. Elsewhere it is taken off
-as row sums let guess, and again as the mesh of what is left has it: a fixed point, mixed from the last rounds after
-Anderson, which is found up to s h^2 / c of 1 to 3, on meshes of any size.
+Where entries tell the areas of cells, or the fit of edge lengths found them, the mass matrix is taken off before
+anything is solved. Elsewhere it is taken off as row sums let guess, and again as the mesh of what is left has it: a
+fixed point, mixed from the last rounds after Anderson, which is found up to s h^2 / c of 1 to 3, on meshes of any size.
 
 D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12 (1965), 547-560.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Terms
-from ..clock import Clock
-from ..conforming.mass import Blocks, Weights, guessed_from_sums, less, told_by_entries, weights_at
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
-from .held import Held, RowSums, size_note
-from .recover import unscaled
-
-Of = Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh]
-Sized = Callable[[OperatorMatrix, Sequence[Cells]], PlanarMesh]
+from .cells import Blocks, Weights, less, told_by_entries, weights_at
+from .held import Held
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +35,7 @@ class LessMass:
 
 def less_mass(matrix: OperatorMatrix) -> LessMass | None:
     """A matrix c L + s M less s M; None where row sums show no mass, or rows no such cells that tell it."""
-    sign = RowSums(matrix).sign
+    sign = Held(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None
     weights = cells and told_by_entries(matrix, cells.blocks)
     if not cells or not weights or not all((sign * some > 0).all() for some in weights.values()):
@@ -48,46 +43,21 @@ def less_mass(matrix: OperatorMatrix) -> LessMass | None:
     return LessMass(less(matrix, cells.blocks, weights), cells, weights)
 
 
-def recover_elements_with_terms(
-    matrix: OperatorMatrix, of_cells: Of, clock: Clock, *, anchored: bool
-) -> PlanarMesh | None:
-    """The mesh of c L + s M or S c L S; None where row sums show neither, or nothing comes near.
-
-    `of_cells`: recovers a matrix c L + D on cells that its rows may form; `anchored`: whether positions are given, so
-    that no piece may change its size.
-    """
-    sums = RowSums(matrix)
-    if not sums.there.any():
-        return None
-
-    def sized(left: OperatorMatrix, shown: Sequence[Cells]) -> PlanarMesh:
-        found = of_cells(left, shown)
-        return found if anchored else _in_one_size(found, sums.values, shown[0].blocks)
-
-    try:
-        if (told := less_mass(matrix)) is not None:
-            return _settled(matrix, told.weights, told.cells, sized, patience=0)
-        cells = next(shown_cells(matrix), None)
-        if cells is None:
-            return None
-        scaled = None if sums.sign else unscaled(Held(matrix), lambda left: of_cells(left, shown_cells(left)), clock)
-        if scaled is not None:
-            return scaled
-        guessed = guessed_from_sums(sums.values, cells.blocks)  # serendipity functions have integrals of both signs
-        areas = np.concatenate([some.sum(axis=1) for some in guessed.values()])
-        return _settled(matrix, guessed, cells, sized) if np.ptp(np.sign(areas)) == 0 else None
-    except RecoveryError:
-        return None
-
-
-def _settled(
-    matrix: OperatorMatrix, start: Weights, cells: Cells, of_cells: Sized, *, patience: int = 9
+def settled(
+    held: Held,
+    start: Weights,
+    blocks: Blocks,
+    plain: Callable[[OperatorMatrix], PlanarMesh],
+    *,
+    patience: int = 9,
+    told: bool = False,
 ) -> PlanarMesh | None:
     """The mesh whose mass matrix, taken off, leaves its Laplacian; the nearest where there is none.
 
-    As many rounds as `patience` are mixed, and may pass without a better one.
+    As many rounds as `patience` are mixed, and may pass without a better one; `told`: whether the matrix says what the
+    weights to begin with are.
     """
-    blocks, area = cells.blocks, float(RowSums(matrix).values.sum())  # times s
+    area = float(held.matrix.row_sums.sum())  # times s
     x = np.concatenate([some.ravel() for some in start.values()])
     ends = np.cumsum([some.size for some in start.values()])
     best, least, since, rounds = None, np.inf, 0, list[tuple[NDArray, NDArray]]()
@@ -95,7 +65,7 @@ def _settled(
         parts = zip(start.items(), np.split(x, ends[:-1]), strict=True)
         weights = {kind: part.reshape(some.shape) for (kind, some), part in parts}
         try:
-            found = of_cells(less(matrix, blocks, weights), [cells])
+            found = plain(less(held.matrix, blocks, weights))
         except RecoveryError:
             break
         areas = weights_at(found.points, blocks)
@@ -113,13 +83,12 @@ def _settled(
     if best is None:
         return None
     found, reaction = best
-    operator, terms = "c L + s M, M the consistent mass matrix,", Terms(matrix.diagonal, reaction)
-    # Where entries tell it the mass is not found, but read off.
-    unproved = "that no other mesh, with another mass, fits as well is not proved" if patience else ""
-    return Held(matrix).with_terms(found, terms, operator, size_note(reaction), unproved=unproved)
+    operator, terms = "c L + s M, M the consistent mass matrix,", Terms(held.matrix.diagonal, reaction)
+    unproved = "" if told else "that no other mesh, with another mass, fits as well is not proved"
+    return held.with_terms(found, terms, operator, unproved=unproved)
 
 
-def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
+def in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
     """Pieces that share no vertex, each about its centroid in the size that its row sums give it beside the first."""
     component, n = found.component, len(found.scale)
     if n == 1 or len(found.hinges) or (component < 0).any():

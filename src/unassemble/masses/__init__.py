@@ -1,0 +1,11 @@
+"""Mass matrices: alone, beside a stiffness matrix, or in one sum with it, and scaled unknowns, which sums tell from it.
+
+`cells` says what they look like, and what entries and row sums say of the areas; `lengths` and `settled` find those
+that these do not tell; `held` judges what was found by the whole matrix.
+"""
+
+from .beside import weighed
+from .recover import recover_elements_with_terms, recover_with_terms
+from .settled import less_mass
+
+__all__ = ["less_mass", "recover_elements_with_terms", "recover_with_terms", "weighed"]
