@@ -74,8 +74,7 @@ class ScalarReadings:
         told = terms and less_mass(self.matrix) is not None  # by entries that are zero without a mass term
         found = (with_terms() if told else None) or plainly()
         # One that is off by 1e-10, because of an entry that stands out, lacks no term.
-        near = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
-        if terms and not (told or near):
+        if terms and not told and not (found and (found.status != "uncertified" or found.backward_error <= CERTIFIED)):
             found = with_terms() or found
         return found if found and (found.status != "uncertified" or found.backward_error < LITTLE) else None
 

@@ -45,22 +45,9 @@ def recover_partial(
 ) -> PlanarMesh | None:
     """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    whole : (e,) bool or None
-        Entries that may be relied upon; None for those that have triangles on both sides, and those of rows that add
-        up to zero where others do not.
-    placement : Placement
-    clock : Clock
-    options : ScalarOptions
-    fitted : callable
-        Meshes of pieces, None for those that have none.
-
-    Returns
-    -------
-    PlanarMesh or None
-        None where no part of the mesh is determined, or all of the matrix is whole.
+    None where no part of it is determined, or all of the matrix is whole. `whole` (e,): entries that may be relied
+    upon; None for those that have triangles on both sides, and those of rows that add up to zero where others do not.
+    `fitted`: meshes of pieces, None for those that have none.
     """
     if options.method != "conformal" or options.noise is not None:
         return None

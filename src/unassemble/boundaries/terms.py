@@ -29,19 +29,8 @@ def recover_without_boundary_terms(
 ) -> PlanarMesh | None:
     """The certified mesh of a matrix without the terms on its boundary; None where there are no such terms.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    plain : callable
-        The mesh of a matrix without them.
-    scale : float, optional
-        c, where it is known.
-
-    Returns
-    -------
-    PlanarMesh or None
-        Certified only where the terms of one factor for each loop and one field, integrated on the mesh as it is
-        written, give entries and row sums back.
+    It is certified only where the terms of one factor for each loop and one field, integrated on the mesh as it is
+    written, give entries and row sums back. `plain`: the mesh of a matrix without them; `scale`: c, where it is known.
     """
     loops = _Loops.of(matrix)
     if loops is None:

@@ -23,7 +23,7 @@ class JoinedParts:
         """Parts are the pieces of the topology."""
         n = topology.n_vertices
         self.points = np.full((n, 2), np.nan)  # of each about its origin
-        self.component = np.full(n, -1, dtype=np.int64)
+        self.component = topology.component
         self.blocks: dict[str, NDArray[np.int64]] = {}
         self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
         self._topology, self._fits, self._tensor = topology, fits, placement.tensor
@@ -33,7 +33,6 @@ class JoinedParts:
         for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
             part, z = fits[label].part, self.placed[label]
             self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
-            self.component[part.piece.vertices] = label
             a, b, c = z[part.piece.triangles].T
             mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
             for kind, cells in part.blocks.items():

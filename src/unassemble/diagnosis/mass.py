@@ -85,7 +85,7 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
     bounds = _bounds(M) if not exact and (crowded or not planar) else None
     # Rows may form straight triangles of second or third order, where more than their mass is there.
     less = None if bounds is None else less_mass(matrix)
-    more = less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
+    more = less is not None and bool(np.abs(less[0].entries).max() > ALIKE * np.abs(matrix.entries).max())
     if bounds is None or more:
         return None
     shown = (

@@ -61,8 +61,8 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
 def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of a scalar matrix whose rows form cells of other elements than linear triangles; empty where they form none."""
     read = [(matrix, cells) for cells in islice(shown_cells(matrix), 1)]
-    read += [(less.matrix, less.cells)] if (less := less_mass(matrix)) is not None else []
-    for whole, cells in read:  # without a mass term, and with one
+    without = less_mass(matrix)
+    for whole, cells in read + ([without[:2]] if without else []):  # without a mass term, and with one
         with suppress(TopologyError):
             if typical_misfit(whole, cells.blocks) > _LIKE:
                 continue

@@ -8,7 +8,7 @@ assembled here on the mesh as written and held against the matrix as given.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,6 +22,8 @@ from ..recovery import Body, PlanarMesh, Recovery
 from ..tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
 from ..words import sentences
 from .cells import mass_matrix, weights_at
+
+Mesh = TypeVar("Mesh", bound=Recovery)
 
 
 def weighed(
@@ -70,7 +72,7 @@ def weighed(
     sized = len(anchors) > 1
     if not sized:
         centre = np.array(anchors[0][1:] if anchors else [0.0] * found.dim)[: found.dim]
-        found = _enlarged(found, factors ** (1 / found.dim), centre)
+        found = enlarged(found, factors ** (1 / found.dim), centre)
     density = float(factors[0]) if sized else 1.0
     misfit = _misfit(density * _assembled(found, lumped), M, whole)
     off = found.position_error if isinstance(found, Body) else None  # a diameter is no longer than all edges
@@ -126,7 +128,7 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
     if found.node_of_row is None or found.direction_of_row is None:
         return scalar
     N, alike = len(found.node_of_row), found.direction_of_row[:, None] == np.arange(found.dim)
-    node = sp.csr_array((np.ones(N), (np.arange(N), found.node_of_row)), shape=(N, n))
+    node = sp.csr_array((np.ones(N), (np.arange(N), np.maximum(found.node_of_row, 0))), shape=(N, n))
     chosen = [sp.diags_array(own.astype(float)) @ node for own in alike.T]
     return sp.csr_array(sum(one @ scalar @ one.T for one in chosen))
 
@@ -141,8 +143,8 @@ def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> f
     return float((over.data[some] / (root[over.row] * root[over.col])[some]).max(initial=0.0))
 
 
-def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Recovery:
-    """The mesh with each piece so many times as large, from a point (d,) on, and its moduli with it."""
+def enlarged(found: Mesh, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Mesh:
+    """The mesh with each piece so many times as large, from a point (d,), or one for each node, and its moduli too."""
     if len(found.hinges) and np.ptp(times) > AGREED * times.max():
         raise GeometryError(
             "pieces that meet in single vertices are of different sizes, by `mass`: that is not read yet"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..conforming.affine import ElementEntries
 from ..conforming.sets import pairs_of
-from ..elements import assembled, exact_rule, mass, volumes
+from ..elements import KINDS, assembled, exact_rule, mass, volumes
 from ..elements.kinds import Kind
 from ..errors import SolverError
 from ..linalg import solved
@@ -23,6 +23,7 @@ from ..matrix import OperatorMatrix
 
 Blocks = Mapping[Kind, NDArray[np.int64]]
 Weights = Mapping[Kind, NDArray[np.float64]]  # (m, q) at the points of each cell
+TRIANGLE = KINDS["triangle"]
 
 
 def evenly(kind: Kind, areas: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -42,31 +43,32 @@ def told_by_entries(matrix: OperatorMatrix, blocks: Blocks) -> Weights | None:
     }
 
 
-def told_without_stiffness(matrix: OperatorMatrix, kind: Kind, cells: NDArray[np.int64]) -> NDArray | None:
-    """(m,) areas of straight cells whose mass matrix this is, by least squares; None where they are not determined.
+def told_without_stiffness(
+    matrix: OperatorMatrix, triangles: NDArray[np.int64], opposite: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    """(m,) areas of linear triangles whose mass matrix this is, by least squares; None where they are not determined.
 
-    Entries (e,) and the diagonal have parts of each area that depend on the kind alone.
+    `opposite` (m, 3): the edges that face the corners of `triangles`.
     """
     given = np.concatenate([matrix.entries, matrix.diagonal])
-    if not given.all():  # those of a mass matrix of linear elements are all positive
+    if not given.all():  # those of a mass matrix are all positive
         return None
-    place, product = np.arange(len(cells)), _masses(kind, evenly(kind, np.ones(1)))[0]
-    a, b = np.triu_indices(kind.nodes, 1)
-    row = np.searchsorted(matrix.edges @ [matrix.n, 1], pairs_of(matrix.n, cells))
-    row = np.hstack([row, len(matrix.edges) + cells])
-    part = np.append(product[a, b], product.diagonal())
-    parts = np.tile(part, len(cells)), (row.ravel(), np.repeat(place, row.shape[1]))
-    # Graded meshes: all to the same number of digits.
-    weighted = sp.csr_array(sp.diags_array(1 / given) @ sp.csr_array(parts, shape=(len(given), len(cells))))
+    own, other = _masses(TRIANGLE, evenly(TRIANGLE, np.ones(1)))[0, 0, :2]
+    parts = sp.vstack([other * incidence(opposite, len(matrix.edges)), own * incidence(triangles, matrix.n)])
+    weighted = sp.csr_array(sp.diags_array(1 / given) @ parts)  # graded meshes: all to the same number of digits
     unit = sp.diags_array(1 / np.sqrt(weighted.power(2).sum(axis=0)))
-    scaled = weighted @ unit
-    normal, areas = sp.csr_array(scaled.T @ scaled), np.zeros(len(cells))
+    scaled, areas = weighted @ unit, np.zeros(len(triangles))
     try:
         for _ in range(2):  # the second step takes off the error of normal equations
-            areas = areas + unit @ solved(normal, scaled.T @ (1 - weighted @ areas))
+            areas = areas + unit @ solved(sp.csr_array(scaled.T @ scaled), scaled.T @ (1 - weighted @ areas))
     except SolverError:
         return None
     return areas
+
+
+def incidence(rows: NDArray[np.int64], size: int) -> sp.csr_array:
+    """(size, m) sums over the triangles that have a row, (m, 3)."""
+    return sp.csr_array((np.ones(rows.size), (rows.ravel(), np.repeat(np.arange(len(rows)), 3))), (size, len(rows)))
 
 
 def guessed_from_sums(sums: NDArray[np.float64], blocks: Blocks) -> Weights:

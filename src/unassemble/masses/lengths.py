@@ -22,6 +22,7 @@ from ..errors import SolverError
 from ..linalg import solved
 from ..metric.heron import areas_cotangents, blocks_of, longest_step, summed
 from ..tolerances import HARDLY_ANY
+from .cells import incidence
 
 _log = logging.getLogger(__name__)
 
@@ -40,45 +41,43 @@ class _Equations:
 
     def residual(self, u: NDArray, c: float) -> NDArray[np.float64]:
         """(e + n,) cosines given minus fitted, and row sums fitted over given, minus one."""
-        area, cotangents = areas_cotangents(u[self.opposite])
-        k, given = self._unit(c), self._given(area) / c
-        one, other = (k * w / np.hypot(1, k * w) for w in (given, summed(self.opposite, cotangents / 2, len(u))))
-        return np.concatenate([one - other, self.trust * (self.at_vertices @ area / (3 * self.sums) - 1)])
+        _, area, _, _, given, fitted = self._at(u, c)
+        cosines = given / np.hypot(1, given) - fitted / np.hypot(1, fitted)
+        return np.concatenate([cosines, self.trust * (self.at_vertices @ area / (3 * self.sums) - 1)])
 
     def derivative(self, u: NDArray, c: float) -> tuple[sp.csr_array, NDArray[np.float64]]:
         """(e + n, e) by the logarithms of u, and (e + n,) by that of c."""
-        own, (m, e) = u[self.opposite], (len(self.opposite), len(u))
-        area, cotangents = areas_cotangents(own)
-        weights, ones = summed(self.opposite, cotangents / 2, e), np.ones(m)
-        k, given = self._unit(c), self._given(area) / c
-        slope_given, slope = (k * (1 + (k * w) ** 2) ** -1.5 for w in (given, weights))
+        own, area, cotangents, unit, given, fitted = self._at(u, c)
+        e, m, ones = len(u), len(own), np.ones(len(own))
         blocks = -2 * blocks_of(own, area, cotangents, ones, -ones) / own[:, :, None]
         place = np.repeat(self.opposite, 3, axis=1).ravel(), np.tile(self.opposite, (1, 3)).ravel()
         of_weights = sp.csr_array((blocks.ravel(), place), shape=(e, e))
         place = np.repeat(np.arange(m), 3), self.opposite.ravel()
         of_areas = sp.csr_array(((own * cotangents / 4).ravel(), place), shape=(m, e))
-        cosines = sp.diags_array(slope_given / (12 * c)) @ (self.at_edges @ of_areas)
-        cosines = cosines - sp.diags_array(slope) @ of_weights
+        slope, slope_fitted = ((1 + x**2) ** -1.5 for x in (given, fitted))
+        cosines = sp.diags_array(slope * unit / (12 * c)) @ (self.at_edges @ of_areas)
+        cosines = cosines - sp.diags_array(slope_fitted * unit) @ of_weights
         sums = sp.diags_array(self.trust / (3 * self.sums)) @ (self.at_vertices @ of_areas)
-        by_c = np.concatenate([-slope_given * given, np.zeros(len(self.sums))])
-        return sp.csr_array(sp.vstack([cosines, sums])), by_c
+        return sp.csr_array(sp.vstack([cosines, sums])), np.concatenate([-slope * given, np.zeros(len(self.sums))])
 
-    def _given(self, area: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(e,) c w, as entries and areas have it."""
-        return np.asarray(self.at_edges @ area / 12 - self.entries)
+    def _at(self, u: NDArray, c: float) -> tuple[NDArray, ...]:
+        """(m, 3) u of sides, (m,) areas, (m, 3) cotangents, (e,) a unit, (e,) weights given and fitted, in this unit.
 
-    def _unit(self, c: float) -> NDArray[np.float64]:
-        """(e,) of weights: for 60 degrees they are then about 1; less where masses of the entry's size change more."""
+        For 60 degrees weights are about 1 then; less where masses of the entry's size change more.
+        """
+        own = u[self.opposite]
+        area, cotangents = areas_cotangents(own)
         of_mass = (self.sums / self.at_vertices.sum(axis=1))[self.edges].mean(axis=1) / 4
-        return np.asarray(2 / self.at_edges.sum(axis=1) * abs(c) / (abs(c) + of_mass))
+        unit = 2 / self.at_edges.sum(axis=1) * abs(c) / (abs(c) + of_mass)
+        given, fitted = (self.at_edges @ area / 12 - self.entries) / c, summed(self.opposite, cotangents / 2, len(u))
+        return own, area, cotangents, unit, unit * given, unit * fitted
 
     def start(self) -> tuple[NDArray[np.float64], float]:
         """Circles about the vertices whose neighbours touch: they have triangles, and sizes from the row sums."""
         radius = np.sqrt(self.sums / self.at_vertices.sum(axis=1) * np.sqrt(3))  # of equilateral triangles
         u = radius[self.edges].sum(axis=1) ** 2
-        area, cotangents = areas_cotangents(u[self.opposite])
-        ratio = self._given(area) / summed(self.opposite, cotangents / 2, len(u))
-        return u, float(np.sign(np.median(ratio)) * np.median(np.abs(ratio)))
+        *_, given, fitted = self._at(u, 1.0)
+        return u, float(np.sign(np.median(given / fitted)) * np.median(np.abs(given / fitted)))
 
     def within(self, u: NDArray, change: NDArray) -> NDArray[np.float64]:
         """(e,) a change of u (e,), less at the edges of triangles that it would make flat: these hold up no others."""
@@ -102,7 +101,7 @@ def fit_areas(
     Returns areas (m,) and squared lengths (e,), in units in which s = 1, and the root mean square of the equations'
     residuals: cosines, and relative areas.
     """
-    at_edges, at_vertices = _incidence(opposite, len(edges)), _incidence(triangles, len(sums))
+    at_edges, at_vertices = incidence(opposite, len(edges)), incidence(triangles, len(sums))
     equations = _Equations(edges, opposite, entries, sums, trust, at_edges, at_vertices)
     u, c = equations.start()
     if not c:
@@ -149,8 +148,3 @@ def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping:
     rest = (1 + damping) * (by_c @ by_c) - coupling @ by_scale
     log_c = -float((by_c @ residual - coupling @ by_residual) / rest)
     return -by_residual - log_c * by_scale, log_c
-
-
-def _incidence(rows: NDArray[np.int64], size: int) -> sp.csr_array:
-    """(size, m) sums over the triangles (m, 3) that have a row."""
-    return sp.csr_array((np.ones(rows.size), (rows.ravel(), np.repeat(np.arange(len(rows)), 3))), (size, len(rows)))

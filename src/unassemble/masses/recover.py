@@ -78,7 +78,7 @@ def recover_elements_with_terms(
         return None
     try:
         told = less_mass(matrix)
-        cells = told.cells if told else next(shown_cells(matrix), None)
+        cells = told[1] if told else next(shown_cells(matrix), None)
         if cells is None:
             return None
         if not (told or held.sign):
@@ -86,7 +86,7 @@ def recover_elements_with_terms(
             if scaled is not None:
                 return scaled
         # Serendipity functions have integrals of both signs.
-        weights = told.weights if told else guessed_from_sums(matrix.row_sums, cells.blocks)
+        weights = told[2] if told else guessed_from_sums(matrix.row_sums, cells.blocks)
         if np.ptp(np.sign(np.concatenate([some.sum(axis=1) for some in weights.values()]))):
             return None
 

@@ -8,7 +8,6 @@ D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,27 +19,19 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
+from .beside import enlarged
 from .cells import Blocks, Weights, less, told_by_entries, weights_at
 from .held import Held
 
 
-@dataclass(frozen=True, eq=False)
-class LessMass:
-    """A matrix less its mass term."""
-
-    matrix: OperatorMatrix  # c L
-    cells: Cells
-    weights: Weights  # times s
-
-
-def less_mass(matrix: OperatorMatrix) -> LessMass | None:
-    """A matrix c L + s M less s M; None where row sums show no mass, or rows no such cells that tell it."""
+def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, Cells, Weights] | None:
+    """Of c L + s M first c L, its cells and their weights; None where no sums, or no cells, tell the mass."""
     sign = Held(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None
     weights = cells and told_by_entries(matrix, cells.blocks)
     if not cells or not weights or not all((sign * some > 0).all() for some in weights.values()):
         return None
-    return LessMass(less(matrix, cells.blocks, weights), cells, weights)
+    return less(matrix, cells.blocks, weights), cells, weights
 
 
 def settled(
@@ -93,13 +84,8 @@ def in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) ->
     component, n = found.component, len(found.scale)
     if n == 1 or len(found.hinges) or (component < 0).any():
         return found
-    areas = weights_at(found.points, blocks)
+    areas, count = weights_at(found.points, blocks), np.bincount(component)
     each = sum(np.bincount(component[cells[:, 0]], areas[kind].sum(axis=1), n) for kind, cells in blocks.items())
     ratio = np.bincount(component, sums, n) / each
-    if not (ratio / ratio[0] > 0).all():
-        return found
-    factor = np.sqrt(ratio / ratio[0])[component, None]
-    count = np.bincount(component)
     centre = np.column_stack([np.bincount(component, x) / count for x in found.points.T])[component]
-    bars = None if found.standard_deviations is None else factor * found.standard_deviations
-    return replace(found, points=centre + factor * (found.points - centre), standard_deviations=bars)
+    return enlarged(found, np.sqrt(ratio / ratio[0]), centre) if (ratio / ratio[0] > 0).all() else found

@@ -5,20 +5,17 @@ from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..elements.kinds import KINDS
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
 from ..topology.surface import Together
-from .cells import evenly, less, mass_matrix, told_without_stiffness, weights_at
+from .cells import TRIANGLE, evenly, less, mass_matrix, told_without_stiffness, weights_at
 from .held import Held, Plain
 from .lengths import fit_areas
 from .settled import settled
 
-_KIND = KINDS["triangle"]
 
-
-def mass_alone(held: Held, topology: Topology, triangles: NDArray[np.int64]) -> PlanarMesh | None:
+def _mass_alone(held: Held, topology: Topology, triangles: NDArray, opposite: NDArray) -> PlanarMesh | None:
     """Areas of triangles (m, 3) of a mass matrix; None where areas do not explain it.
 
     There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
@@ -26,22 +23,19 @@ def mass_alone(held: Held, topology: Topology, triangles: NDArray[np.int64]) -> 
     matrix, sign = held.matrix, held.sign
     if not (sign * matrix.entries > 0).all():
         return None
-    areas = told_without_stiffness(matrix, _KIND, triangles)
+    areas = told_without_stiffness(matrix, triangles, opposite)
     if areas is None:
         return None
     hole = np.abs(areas) <= CERTIFIED * np.abs(matrix.row_sums[triangles].sum(axis=1))
     areas, triangles = areas[~hole], triangles[~hole]
-    left = less(matrix, {_KIND: triangles}, {_KIND: evenly(_KIND, areas)})
+    left = less(matrix, {TRIANGLE: triangles}, {TRIANGLE: evenly(TRIANGLE, areas)})
     error = float(max(np.abs(left.entries / matrix.entries).max(), np.abs(left.diagonal / matrix.diagonal).max()))
     if not (error <= CERTIFIED and (sign * areas > 0).all()):
         return None
-    component = np.full(matrix.n, -1)
-    for label in reversed(range(len(topology.pieces))):
-        component[topology.pieces[label].vertices] = label
     return PlanarMesh(
         points=np.full((matrix.n, 2), np.nan),
         triangles=triangles,
-        component=component,
+        component=topology.component,
         hinges=topology.hinges,
         scale=np.zeros(len(topology.pieces)),
         node_status=np.ones(matrix.n, dtype=np.int8),
@@ -62,7 +56,7 @@ def with_consistent_mass(held: Held, topology: Topology, plain: Plain, clock: Cl
     """The mesh of c L + s M, or areas of s M; None where no areas come near the entries."""
     matrix, union = held.matrix, Together(topology.pieces)
     triangles, opposite = union.vertices[union.triangles], union.edge_rows[union.opposite]
-    if (found := mass_alone(held, topology, triangles)) is not None:
+    if (found := _mass_alone(held, topology, triangles, opposite)) is not None:
         return found
     # Row sums of at least their rounding; those that have lost digits that a certificate could notice weigh less.
     sums = np.maximum(np.abs(matrix.row_sums), held.rounding)
@@ -74,15 +68,15 @@ def with_consistent_mass(held: Held, topology: Topology, plain: Plain, clock: Cl
     if fit is None or fit[2] >= ALIKE:
         return None
     areas, squared_lengths, _ = fit
-    weights = {_KIND: evenly(_KIND, held.sign * areas)}
-    return settled(held, weights, {_KIND: triangles}, lambda left: plain(left, squared_lengths), patience=0)
+    weights = {TRIANGLE: evenly(TRIANGLE, held.sign * areas)}
+    return settled(held, weights, {TRIANGLE: triangles}, lambda left: plain(left, squared_lengths), patience=0)
 
 
 def with_lumped_mass(held: Held, found: PlanarMesh) -> PlanarMesh:
     """A mesh of c L + D; if D is proportional to the areas about its vertices that is a lumped mass matrix."""
     if not found.certified:
         return found
-    blocks, sums = {_KIND: found.divided()[0]}, held.matrix.row_sums
+    blocks, sums = {TRIANGLE: found.divided()[0]}, held.matrix.row_sums
     share = mass_matrix(held.matrix.n, blocks, weights_at(found.points, blocks)).sum(axis=1)
     reaction = float(sums.sum() / share.sum())
     if not (np.abs(sums - reaction * share) <= ALIKE * np.abs(reaction * share) + held.rounding).all():

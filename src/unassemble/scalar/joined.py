@@ -49,11 +49,8 @@ class JoinedMesh:
         """Join pieces at positions `placed`, turning over those that are mirrored."""
         pieces = Together(topology.pieces)
         z = np.concatenate(placed)
-        label = np.repeat(np.arange(len(placed)), pieces.n_vertices)[::-1]  # the first piece at a hinge comes last
-        points = np.full((topology.n_vertices, 2), np.nan)
+        points = np.full((topology.n_vertices, 2), np.nan)  # the first piece at a hinge comes last
         points[pieces.vertices[::-1]] = np.column_stack([z.real, z.imag])[::-1]
-        component = np.full(topology.n_vertices, -1, dtype=np.int64)
-        component[pieces.vertices[::-1]] = label
         a, b, c = z[pieces.triangles].T
         mirrored = np.bincount(pieces.triangle_piece, (np.conj(b - a) * (c - a)).imag, len(placed)) < 0
         turned = mirrored[pieces.triangle_piece, None]
@@ -75,7 +72,7 @@ class JoinedMesh:
             triangle_piece=pieces.triangle_piece,
             in_polygon=in_polygon,
             polygons=polygons.counter_clockwise(points),
-            component=component,
+            component=topology.component,
             scale=scale,
             boundary=np.concatenate(boundary),
             boundary_offsets=np.append(0, np.cumsum(np.concatenate(lengths))),

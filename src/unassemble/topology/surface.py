@@ -114,6 +114,14 @@ class Topology:
         return count
 
     @property
+    def component(self) -> NDArray[np.int64]:
+        """(n,) the first of the pieces at each vertex, -1 where there is none."""
+        label = np.full(self.n_vertices, -1, dtype=np.int64)
+        for k in range(len(self.pieces))[::-1]:
+            label[self.pieces[k].vertices] = k
+        return label
+
+    @property
     def hinges(self) -> NDArray[np.int64]:
         """Vertices shared by several pieces."""
         return np.flatnonzero(self.multiplicity > 1)
