@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 
 from ..topology.keys import distinct, runs
 
-_AXES = np.array([(1, 0), (0, 1)])
-_DIAGONALS = np.array([(1, 1), (-1, 1)])
-STEPS = {4: _AXES, 6: np.array([(1, 0), (0, 1), (-1, 1)]), 8: np.vstack([_AXES, _DIAGONALS])}
+STEPS = {k: np.array([(1, 0), (0, 1), *more]) for k, more in ((4, ()), (6, ((-1, 1),)), (8, ((1, 1), (-1, 1))))}
 """Directions of edges, up to sign, by the number of neighbours of a row inside."""
 
 

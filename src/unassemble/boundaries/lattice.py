@@ -34,11 +34,6 @@ class _Kind:
     pairs: NDArray[np.int64]  # (p, 3) corners that have an entry, and its direction, a row of :data:`.grid.STEPS`
     part: NDArray[np.float64]  # (directions, 3) what a cell adds to an entry, by (G11, G22, G12)
 
-    @property
-    def sharing(self) -> NDArray[np.int64]:
-        """(directions,) number of cells that share an edge."""
-        return len(self.corners) * np.bincount(self.pairs[:, 2])
-
 
 _SQUARE = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
 _SIDES = ((0, 1, 0), (1, 2, 1), (2, 3, 0), (3, 0, 1))
@@ -104,8 +99,7 @@ class Lattice:
         used = np.arange(len(at)) < n
         used[cells] = True
         cells = (np.cumsum(used) - 1)[cells]
-        rows, columns = (np.concatenate(ends, axis=1) for ends in
-                         ((cells[:, one], cells[:, other]), (cells[:, other], cells[:, one])))  # fmt: skip
+        rows, columns = cells[:, np.append(one, other)], cells[:, np.append(other, one)]
         out = (rows < n) & (columns >= n)
         beyond = sp.coo_array((np.tile(parts, 2)[out], (rows[out], columns[out] - n)), shape=(n, int(used.sum()) - n))
         return cls(grid.neighbours == 8, scale, z[used], cells, beyond.tocsr(), added)
@@ -133,7 +127,7 @@ def _sizes(
     across = kind.pairs[:, 2] > 1
     half = np.repeat(entries[inside[:, across]].sum(axis=1) / 2, np.count_nonzero(~across))
     weight = -entries - np.bincount(inside[:, ~across].ravel(), half, len(entries))
-    whole = number == kind.sharing[grid.step]
+    whole = number == len(kind.corners) * np.bincount(kind.pairs[:, 2])[grid.step]
     start = (grid.at - grid.at.min(axis=0))[matrix.edges].min(axis=1)
     products = []
     for axis in (0, 1):

@@ -113,11 +113,7 @@ def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
 
 
 def _backward_error(
-    matrix: OperatorMatrix,
-    own: NDArray[np.int64],
-    z: NDArray[np.complex128],
-    cells: NDArray[np.int64],
-    lattice: Lattice,
+    matrix: OperatorMatrix, own: NDArray[np.int64], z: NDArray, cells: NDArray[np.int64], lattice: Lattice
 ) -> float:
     """Of entries, and of diagonal entries, which say how much is gone, of the rows `own`, (k,).
 

@@ -13,26 +13,16 @@ from ..tolerances import CERTIFIED
 from ..topology.keys import distinct, pair_keys
 from .lattice import Lattice
 
+Labels = NDArray[np.uint64]
+
 
 def seated(
     matrix: OperatorMatrix, own: NDArray[np.int64], lattice: Lattice
 ) -> tuple[NDArray[np.int64], NDArray[np.int8]] | None:
-    """Numbers of the vertices of a lattice on rows `own`, (k,), and status of all rows; None where columns do not fit.
+    """Rows of the vertices of a lattice on rows `own`, (k,), and the status of all; None where columns do not fit.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    own : (k,) int
-        Rows that the lattice has, others are of the identity.
-    lattice : Lattice
-        Of these rows.
-
-    Returns
-    -------
-    row : (k + g,) int
-        The row of each vertex; n, n + 1, ... for those that have none.
-    status : (n,) int8
-        As in :class:`..recovery.Recovery`.
+    Returns `row` (k + g,) int64, n, n + 1, ... for vertices that have none, and `status` (n,) int8, as in
+    :class:`..recovery.Recovery`.
     """
     n, k, size = matrix.n, len(own), matrix.row_size[own]
     beside = np.ones(n, dtype=bool)
@@ -57,13 +47,10 @@ def seated(
     return row, status
 
 
-def _columns(
-    entries: sp.csr_array, size: NDArray[np.float64]
-) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.uint64]]:
-    """Labels of columns, (g,), 0 for empty ones; which are not, (h,), in the order of labels and entries; and theirs.
+def _columns(entries: sp.csr_array, size: NDArray[np.float64]) -> tuple[Labels, NDArray[np.int64], Labels]:
+    """Labels of columns, (g,), 0 for empty ones; the others, (h,), in the order of labels and entries; and theirs.
 
-    Labels are those of the rows with an entry there, and of how many of the same rows have smaller ones. `size` (k,) is
-    that of the entries of each row.
+    Labels are the same for columns that have the same entries, in rows of entries of `size`, (k,).
     """
     rng = np.random.default_rng(0)
     label, weight = rng.integers(2**63, size=len(size), dtype=np.uint64), rng.uniform(1, 2, len(size))
@@ -81,11 +68,7 @@ def _columns(
 
 
 def _seat(
-    seat: NDArray[np.int64],
-    by_vertex: NDArray[np.uint64],
-    by_row: NDArray[np.uint64],
-    cells: NDArray[np.int64],
-    stored: NDArray[np.int64],
+    seat: NDArray[np.int64], by_vertex: Labels, by_row: Labels, cells: NDArray[np.int64], stored: NDArray[np.int64]
 ) -> None:
     """Fill in the rows of vertices, (g,), as long as labels and seated neighbours tell one row and one vertex.
 
@@ -108,8 +91,8 @@ def _seat(
 
 
 def _alone(
-    labels: NDArray[np.uint64], ends: NDArray[np.int64], seated: NDArray[np.int64], own: NDArray[np.uint64]
-) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
+    labels: Labels, ends: NDArray[np.int64], seated: NDArray[np.int64], own: Labels
+) -> tuple[Labels, NDArray[np.int64]]:
     """Sums of labels (k,) and those that seated neighbours have of their `own`, where no other is the same; and where.
 
     Of those not `seated`, (k,) negative.
