@@ -50,7 +50,7 @@ class ScalarReadings:
 
     @cached_property
     def lattice(self) -> PlanarMesh | None:
-        """A grid of cells that are all alike, beside rows that were taken out; None where it is none."""
+        """A grid of parallelograms beside rows that were taken out; None where it is none."""
         return recover_lattice(self.matrix, self.placement, self.clock, self.options)
 
     @cached_property

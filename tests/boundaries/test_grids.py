@@ -1,4 +1,4 @@
-"""Grids of rectangles, alike or not, with Dirichlet conditions of every kind; scikit-fem assembles."""
+"""Grids of parallelograms, alike or not, with Dirichlet conditions of every kind; scikit-fem assembles."""
 
 from contextlib import suppress
 
@@ -17,12 +17,11 @@ STEPS = pytest.mark.parametrize("lines", [UNIFORM, GRADED], ids=["uniform", "gra
 ELEMENTS = pytest.mark.parametrize("element", ["P1", "Q1"])
 
 
-def assembled(element, lines):
+def assembled(element, lines, shear=0.0):
     """A stiffness matrix with some c, and points."""
-    if element == "P1":
-        basis = Basis(MeshTri.init_tensor(*lines), ElementTriP1())
-    else:
-        basis = Basis(MeshQuad.init_tensor(*lines), ElementQuad1())
+    kind, functions = (MeshTri, ElementTriP1()) if element == "P1" else (MeshQuad, ElementQuad1())
+    mesh = kind.init_tensor(*lines)
+    basis = Basis(kind(np.array([(1, shear), (0, 1)]) @ mesh.p, mesh.t), functions)
     return 3.7 * sp.csr_array(asm(laplace, basis)), basis.mesh
 
 
@@ -53,6 +52,16 @@ def test_eliminated(element, lines):
     found = check(matrix[inside][:, inside], mesh.p.T[inside], known=len(inside))
     assert isinstance(found, ConformingMesh) == (element == "Q1")
     assert len(found.eliminated_points) == len(mesh.boundary_nodes())
+
+
+@ELEMENTS
+@pytest.mark.parametrize("seed", range(3))  # any direction of the triangles may come first
+@pytest.mark.parametrize("shear", [0.4, -1.1])
+def test_sheared(element, seed, shear):
+    matrix, mesh = assembled(element, GRADED, shear)
+    inside = mesh.interior_nodes()
+    points = mesh.p.T[inside]
+    check(*shuffled(matrix[inside][:, inside], points, seed), known=len(inside))
 
 
 @STEPS

@@ -10,15 +10,16 @@ is wide.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-_AXES = np.array([(1, 0), (0, 1)])
-_DIAGONALS = np.array([(1, 1), (-1, 1)])
-STEPS = {4: _AXES, 6: np.array([(1, 0), (0, 1), (-1, 1)]), 8: np.vstack([_AXES, _DIAGONALS])}
+from ..topology.keys import distinct, runs
+
+STEPS = {k: np.array([(1, 0), (0, 1), *more]) for k, more in ((4, ()), (6, ((-1, 1),)), (8, ((1, 1), (-1, 1))))}
 """Directions of edges, up to sign, by the number of neighbours of a row inside."""
 
 
@@ -38,18 +39,22 @@ class Grid:
             return None
         both = np.concatenate([edges, edges[:, ::-1]]).astype(np.int32)
         graph = sp.coo_array((np.ones(len(both), np.int8), both.T), shape=(n, n)).tocsr()
-        seed = _Rows.of(sp.csr_array(graph + (_common(graph) == 2)) if neighbours == 4 else graph)  # with diagonals
-        if seed is None or not len(seed.rows):
-            return None
-        at = _spread(seed, n)
+        at = _coordinates(sp.csr_array(graph + (_common(graph) == 2)) if neighbours == 4 else graph)  # with diagonals
         if at is None:
             return None
         along, steps = (at[edges[:, 1]] - at[edges[:, 0]])[:, None], STEPS[neighbours]
         match = (along == steps).all(axis=2) | (along == -steps).all(axis=2)
         shifted = (at - at.min(axis=0)) @ [1, 2 * n]
-        if not match.any(axis=1).all() or len(np.unique(shifted)) < n:
+        if not match.any(axis=1).all() or len(distinct(shifted)) < n:
             return None
         return cls(neighbours, at, match.argmax(axis=1))
+
+    def turned(self) -> Iterator[Grid]:
+        """The same with each direction of triangles in turn as that across two of them."""
+        at, step = self.at, self.step
+        for _ in range(3 if self.neighbours == 6 else 1):
+            yield Grid(self.neighbours, at, step)
+            at, step = at @ np.array([[1, -1], [1, 0]]), (step - 1) % 3
 
 
 def _common(graph: sp.csr_array) -> sp.csr_array:
@@ -59,92 +64,71 @@ def _common(graph: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(common - common.multiply(graph))
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Rows with all their neighbours, and opposite pairs of these."""
+def _opposite(graph: sp.csr_array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows (k,) with all their neighbours, and opposite pairs of these, (k, 3 or 4, 2).
 
-    graph: sp.csr_array  # of triangles, or of squares with diagonals
-    rows: NDArray[np.int64]  # (k,)
-    pairs: NDArray[np.int64]  # (k, 3 or 4, 2)
-
-    @classmethod
-    def of(cls, graph: sp.csr_array) -> _Rows | None:
-        """None for a graph that is neither of triangles nor of squares with diagonals."""
-        degree = np.diff(graph.indptr)
-        most = int(degree.max())
-        if most not in (6, 8):
-            return None
-        rows = np.flatnonzero(degree == most)
-        around = graph.indices[graph.indptr[rows][:, None] + np.arange(most)].astype(np.int64)
-        first, second = np.triu_indices(most, 1)
-        one, other = around[:, first], around[:, second]
-        common = np.asarray(_common(graph)[one.ravel(), other.ravel()]).reshape(one.shape)
-        opposite = common == 1
-        good = opposite.sum(axis=1) == (3 if most == 6 else 2)
-        if most == 8:  # sides of squares: what is left, and not joined by an edge
-            ends = np.zeros((len(rows), most), dtype=bool)
-            i, k = np.nonzero(opposite)
-            ends[i, first[k]] = ends[i, second[k]] = True
-            opposite |= (common > 2) & ~ends[:, first] & ~ends[:, second]
-            good &= opposite.sum(axis=1) == 4
-        rows, opposite = rows[good], opposite[good]
-        pairs = np.stack([one[good][opposite], other[good][opposite]], axis=1).reshape(-1, most // 2, 2)
-        apart = np.sort(pairs.reshape(len(rows), most), axis=1)
-        good = (apart[:, 1:] != apart[:, :-1]).all(axis=1)
-        return cls(graph, rows[good], pairs[good])
-
-    def ring(self) -> dict[int, tuple[int, int]] | None:
-        """Coordinates of the first row, at the origin, and of its neighbours; None where they are none of a grid."""
-        row, pairs = int(self.rows[0]), self.pairs[0].tolist()
-        near = {v: set(_neighbours(self.graph, v)) for v in _neighbours(self.graph, row)}
-        if len(pairs) == 3:
-            a, not_a = pairs[0]
-            (b, not_b), (c, not_c) = (p if p[0] in near[a] else p[::-1] for p in pairs[1:])
-            return {row: (0, 0), a: (1, 0), b: (0, 1), not_c: (-1, 1), not_a: (-1, 0), not_b: (0, -1), c: (1, -1)}
-        sides = [p for p in pairs if sum(len(near[v] & near.keys()) for v in p) == 8]
-        if len(sides) != 2:
-            return None
-        (a, not_a), (b, not_b) = sides
-        at = {row: (0, 0), a: (1, 0), b: (0, 1), not_a: (-1, 0), not_b: (0, -1)}
-        corners = {v: [at[w] for w in near[v] & at.keys() if w != row] for v in near.keys() - at.keys()}
-        return at | {v: (sum(x for x, _ in ends), sum(y for _, y in ends)) for v, ends in corners.items()}
+    The graph is one of triangles, or of squares with diagonals.
+    """
+    degree = np.diff(graph.indptr)
+    most = int(degree.max())
+    rows = np.flatnonzero(degree == most)
+    around = graph.indices[graph.indptr[rows][:, None] + np.arange(most)].astype(np.int64)
+    first, second = np.triu_indices(most, 1)
+    one, other = around[:, first], around[:, second]
+    common = np.asarray(_common(graph)[one.ravel(), other.ravel()]).reshape(one.shape)
+    opposite = common == 1
+    if most == 8:  # sides of squares: what is left, and not joined by an edge
+        ends = np.zeros((len(rows), most), dtype=bool)
+        i, k = np.nonzero(opposite)
+        ends[i, first[k]] = ends[i, second[k]] = True
+        opposite |= (common > 2) & ~ends[:, first] & ~ends[:, second]
+    good = np.count_nonzero(opposite, axis=1) == most // 2
+    pairs = np.stack([one[good][opposite[good]], other[good][opposite[good]]], axis=1)
+    return rows[good], pairs.reshape(-1, most // 2, 2)
 
 
-def _neighbours(graph: sp.csr_array, row: int) -> list[int]:
-    return graph.indices[graph.indptr[row] : graph.indptr[row + 1]].tolist()
+def _neighbours(graph: sp.csr_array, row: int) -> set[int]:
+    return set(graph.indices[graph.indptr[row] : graph.indptr[row + 1]].tolist())
 
 
-def _spread(seed: _Rows, n: int) -> NDArray[np.int64] | None:
-    """Coordinates of all rows, midpoint by midpoint; None where some are not reached."""
-    at, known = np.zeros((n, 2), np.int64), np.zeros(n, dtype=bool)
-    number = np.full(n, -1)
-    number[seed.rows] = np.arange(len(seed.rows))
-    if (start := seed.ring()) is None:
+def _ring(graph: sp.csr_array, row: int, pairs: list[list[int]]) -> dict[int, tuple[int, int]]:
+    """Coordinates of a row, at the origin, and of its neighbours, as they would be in a grid."""
+    ring = _neighbours(graph, row)
+    near = {v: ring & _neighbours(graph, v) for v in ring}
+    (a, not_a), (b, not_b), *_ = sorted(pairs, key=lambda pair: -len(near[pair[0]]))  # diagonals of squares last
+    if b not in near[a]:
+        b, not_b = not_b, b
+    at = {a: (1, 0), b: (0, 1), not_a: (-1, 0), not_b: (0, -1)}
+    beside = {v: [at[w] for w in near[v] & at.keys()] for v in ring - at.keys()}
+    return at | {row: (0, 0)} | {v: (sum(x for x, _ in ends), sum(y for _, y in ends)) for v, ends in beside.items()}
+
+
+def _coordinates(graph: sp.csr_array) -> NDArray[np.int64] | None:
+    """Coordinates of all rows, (n, 2), midpoint by midpoint; None where some are not reached."""
+    if np.diff(graph.indptr).max() not in (6, 8):
         return None
+    rows, opposite = _opposite(graph)
+    if not len(rows):
+        return None
+    n = graph.shape[0]
+    at, known, number = np.zeros((n, 2), np.int64), np.zeros(n, dtype=bool), np.full(n, -1)
+    number[rows] = np.arange(len(rows))
+    start = _ring(graph, int(rows[0]), opposite[0].tolist())
     new = np.array(list(start))
     at[new], known[new] = list(start.values()), True
-    indptr, indices = seed.graph.indptr, seed.graph.indices
     while len(new):
-        size = indptr[new + 1] - indptr[new]
-        own = np.repeat(np.cumsum(size) - size, size)
-        near = indices[np.repeat(indptr[new], size) + np.arange(size.sum()) - own]
-        middle = np.unique(np.concatenate([new, near]))
+        size = graph.indptr[new + 1] - graph.indptr[new]
+        owner, place = runs(size)
+        middle = distinct(np.concatenate([new, graph.indices[graph.indptr[new][owner] + place]]))
         middle = middle[known[middle] & (number[middle] >= 0)]
-        pairs = seed.pairs[number[middle]]
-        first, second = known[pairs].transpose(2, 0, 1)
-        reached = []
-        for one, other, some in ((0, 1, first & ~second), (1, 0, second & ~first)):
-            i, k = np.nonzero(some)
-            at[pairs[i, k, other]] = 2 * at[middle[i]] - at[pairs[i, k, one]]
-            reached.append(pairs[i, k, other])
-        new = np.unique(np.concatenate(reached))
-        known[new] = True
+        pairs = opposite[number[middle]]
+        i, k, end = np.nonzero(known[pairs] & ~known[pairs[:, :, ::-1]])
+        new = pairs[i, k, 1 - end]
+        at[new], known[new] = 2 * at[middle[i]] - at[pairs[i, k, end]], True
+        new = distinct(new)
     for row in np.flatnonzero(~known).tolist():  # corners of a single triangle
-        beside = [v for v in _neighbours(seed.graph, row) if known[v]]
-        if len(beside) != 2:
+        beside = [v for v in _neighbours(graph, row) if known[v]]
+        if len(beside) != 2 or len(apex := _neighbours(graph, beside[0]) & _neighbours(graph, beside[1]) - {row}) != 1:
             return None
-        shared = set(_neighbours(seed.graph, beside[0])) & set(_neighbours(seed.graph, beside[1])) - {row}
-        if len(shared) != 1 or not known[apex := shared.pop()]:
-            return None
-        at[row] = at[beside].sum(axis=0) - at[apex]
+        at[row] = at[beside].sum(axis=0) - at[apex.pop()]
     return at

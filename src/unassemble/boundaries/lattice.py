@@ -1,9 +1,13 @@
-"""A grid whose cells are all alike, continued beyond the rows of the matrix.
+"""A grid continued beyond the rows of the matrix: parallelograms in rows and columns, or halves of these.
 
-Rows with whole surroundings all have the same entries. They give c and the shape of a cell: if G is c sqrt(det g) times
-the inverse of the metric g of a cell, entries are linear in G, and det G = c^2 in the plane. Which cells there are at
-the rim then shows in the entries there, of which each of two cells on an edge has half. Corners of cells that are no
-rows were vertices of a boundary that is gone.
+Each row and column of cells has a size of its own, and all have the same angles. If G is c sqrt(det g) times the
+inverse of the metric g of a cell, then with steps h_i and k_j G11 = s k_j / h_i, G22 = s h_i / k_j and G12 = t are its
+entries, s and t the same in all cells, and c^2 = s^2 - t^2. Those of the matrix are linear in G. Diagonals give t, and
+an edge along x with half of all entries on diagonals of the cells beside it is -s (k_{j-1} + k_j) / (2 h_i), whether
+elements are bilinear, or linear on halves. Such edges, and those along y, are products of what depends on i and what
+depends on j; each gives the steps up to a factor, and sums of two steps say what these factors are. Steps beyond the
+rows show in the entries along the rim, and so does which cells there are: each of two on an edge has a part of its
+entry. Corners of cells that are no rows were vertices of a boundary that is gone.
 """
 
 from __future__ import annotations
@@ -14,12 +18,12 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED, ROUNDED
-from ..topology.keys import Grouped, found, pair_keys
+from ..tolerances import ALIKE, CERTIFIED, ROUNDED
+from ..topology.keys import Grouped, contains, distinct, found, pair_keys
 from .grid import Grid
-from .rectangles import steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,28 +31,25 @@ class _Kind:
     """Cells of a grid."""
 
     corners: NDArray[np.int64]  # (shapes, k, 2) counter-clockwise
-    pairs: tuple[tuple[int, int, int], ...]  # which corners have an entry, and a direction of :data:`.grid.STEPS`
-    sharing: tuple[int, ...]  # number of cells that share an edge of each direction
-    stencil: NDArray[np.float64]  # (directions, 3) entries of a row by (G11, G22, G12)
+    pairs: NDArray[np.int64]  # (p, 3) corners that have an entry, and its direction, a row of :data:`.grid.STEPS`
+    part: NDArray[np.float64]  # (directions, 3) what a cell adds to an entry, by (G11, G22, G12)
 
 
 _SQUARE = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
 _SIDES = ((0, 1, 0), (1, 2, 1), (2, 3, 0), (3, 0, 1))
 _KINDS = {
-    # Squares, rectangles: linear elements on either half, whose entry on the diagonal vanishes.
-    4: _Kind(_SQUARE, _SIDES, (2, 2), -np.array([(1.0, 0, 0), (0, 1, 0)])),
+    # Rectangles: linear elements on either half, whose entry on the diagonal vanishes.
+    4: _Kind(_SQUARE, np.array(_SIDES), -np.eye(2, 3) / 2),
     6: _Kind(
         np.array([[(0, 0), (1, 0), (0, 1)], [(1, 1), (0, 1), (1, 0)]]),
-        ((0, 1, 0), (0, 2, 1), (1, 2, 2)),
-        (2, 2, 2),
-        -np.array([(1.0, 0, 1), (0, 1, 1), (0, 0, -1)]),
+        np.array([(0, 1, 0), (0, 2, 1), (1, 2, 2)]),
+        np.array([(-1, 0, -1), (0, -1, -1), (0, 0, 1)]) / 2,
     ),
     # Bilinear elements.
     8: _Kind(
         _SQUARE,
-        (*_SIDES, (0, 2, 2), (1, 3, 3)),
-        (2, 2, 1, 1),
-        -np.array([(4.0, -2, 0), (-2, 4, 0), (1, 1, 3), (1, 1, -3)]) / 6,
+        np.array([*_SIDES, (0, 2, 2), (1, 3, 3)]),
+        np.array([(-2, 1, 0), (1, -2, 0), (-1, -1, -3), (-1, -1, 3)]) / 6,
     ),
 }
 
@@ -57,8 +58,7 @@ _KINDS = {
 class Lattice:
     """Cells on rows of a matrix, and on vertices that it lacks."""
 
-    neighbours: int  # of a row inside, see :class:`.grid.Grid`; eight where cells are bilinear
-    rectangles: bool  # of different sizes; other cells are all alike
+    bilinear: bool  # cells with entries on both diagonals
     scale: float  # c
     z: NDArray[np.complex128]  # (n + g,) positions of the rows, then of the vertices that are gone
     cells: NDArray[np.int64]  # (m, 3 or 4) all of them, counter-clockwise
@@ -67,138 +67,158 @@ class Lattice:
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:
-        """The lattice that a matrix may belong to; None where its graph is no grid, or no shapes of cells fit."""
+        """The lattice that a matrix may belong to; None where its graph is no grid, or no sizes of cells fit."""
         vanished = np.abs(matrix.entries) <= ROUNDED * matrix.row_size[matrix.edges].min(axis=1)
-        bare = matrix.without(vanished)
-        grid = Grid.of(matrix.n, bare.edges)
-        if grid is not None:
-            matrix = bare
-        elif not vanished.any() or (grid := Grid.of(matrix.n, matrix.edges)) is None:
+        for stored in (matrix.without(vanished), *[matrix] * bool(vanished.any())):
+            grid = Grid.of(matrix.n, stored.edges)
+            if grid is not None:
+                return next((one for turned in grid.turned() if (one := cls._on(stored, turned)) is not None), None)
+        return None
+
+    @classmethod
+    def _on(cls, matrix: OperatorMatrix, grid: Grid) -> Lattice | None:
+        """The same on a grid; None where no sizes fit."""
+        n, kind = matrix.n, _KINDS[grid.neighbours]
+        at, cells = _around(grid.at, kind)
+        one, other, direction = kind.pairs.T
+        key = matrix.edges @ [len(at), 1]
+        edge, stored = found(key, pair_keys(len(at), cells[:, one], cells[:, other]))
+        edge = np.where(stored, edge, -1)
+        sizes = _sizes(matrix, grid, kind, edge[stored.all(axis=1)])
+        if sizes is None:
             return None
-        kind = _KINDS[grid.neighbours]
-        at, cells = _around(grid, kind)
-        rectangles = _rectangles(matrix, grid, at, cells)
-        shapes = rectangles or _alike(matrix, grid, at, cells)
-        if shapes is None:
+        s, t, x, y = sizes
+        scale = float(np.sign(s) * np.sqrt(s**2 - t**2))
+        column, row = at.T
+        z = np.append(0, np.cumsum(x))[column] + (1j * scale - t) / s * np.append(0, np.cumsum(y))[row]
+        h, k = x[column[cells].min(axis=1)], y[row[cells].min(axis=1)]
+        parts = (np.column_stack([s * k / h, s * h / k, np.full(len(h), t)]) @ kind.part.T)[:, direction]
+        diagonal = -parts @ (np.eye(cells.shape[1])[one] + np.eye(cells.shape[1])[other])
+        present, added = _present(matrix, cells, edge, parts, diagonal, h * k)
+        cells, parts = cells[present], parts[present]
+        used = np.arange(len(at)) < n
+        used[cells] = True
+        cells = (np.cumsum(used) - 1)[cells]
+        rows, columns = cells[:, np.append(one, other)], cells[:, np.append(other, one)]
+        out = (rows < n) & (columns >= n)
+        beyond = sp.coo_array((np.tile(parts, 2)[out], (rows[out], columns[out] - n)), shape=(n, int(used.sum()) - n))
+        return cls(grid.neighbours == 8, scale, z[used], cells, beyond.tocsr(), added)
+
+
+def _around(at: NDArray[np.int64], kind: _Kind) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Coordinates from 0 of rows, then of all vertices beside them; and all cells with a row among their corners."""
+    width = int(np.ptp(at[:, 1])) + 3
+    own = (at - at.min(axis=0) + 1) @ [width, 1]
+    wanted = np.concatenate([distinct(own[:, None] - shape)[:, None] + shape for shape in kind.corners @ [width, 1]])
+    gone = distinct(wanted)
+    values = np.concatenate([own, gone[~contains(np.sort(own), gone)]])
+    order = np.argsort(values)
+    return np.column_stack(np.divmod(values, width)), order[np.searchsorted(values, wanted, sorter=order)]
+
+
+def _sizes(
+    matrix: OperatorMatrix, grid: Grid, kind: _Kind, inside: NDArray[np.int64]
+) -> tuple[float, float, NDArray[np.float64], NDArray[np.float64]] | None:
+    """s, t, and steps along both axes, one more at either end; None where entries are no products, or leave them open.
+
+    `inside` (m, p): edges of cells all of which have entries.
+    """
+    entries, number = matrix.entries, np.bincount(inside.ravel(), minlength=len(matrix.edges))
+    across = kind.pairs[:, 2] > 1
+    half = np.repeat(entries[inside[:, across]].sum(axis=1) / 2, np.count_nonzero(~across))
+    weight = -entries - np.bincount(inside[:, ~across].ravel(), half, len(entries))
+    whole = number == len(kind.corners) * np.bincount(kind.pairs[:, 2])[grid.step]
+    start = (grid.at - grid.at.min(axis=0))[matrix.edges].min(axis=1)
+    products = []
+    for axis in (0, 1):
+        some = whole & (grid.step == axis)
+        factors = _factors(start[some, axis], start[some, 1 - axis], weight[some], int(np.ptp(grid.at[:, axis])))
+        if factors is None:
             return None
-        scale, z, form = shapes
-        a, b, c = z[cells[:, :3]].T
-        parts = form @ (kind.stencil / np.array(kind.sharing)[:, None]).T
-        present, added = _present(matrix, kind, parts, np.abs((np.conj(b - a) * (c - a)).imag), cells)
-        n, used = matrix.n, np.arange(len(at)) < matrix.n
-        used[cells[present]] = True
-        cells, parts = (np.cumsum(used) - 1)[cells[present]], parts[present]
-        one, other, which = np.array([*kind.pairs, *((q, p, d) for p, q, d in kind.pairs)]).T
-        row, column = cells[:, one], cells[:, other] - n
-        out = (row < n) & (column >= 0)
-        beyond = sp.coo_array((parts[:, which][out], (row[out], column[out])), shape=(n, int(used.sum()) - n))
-        return cls(grid.neighbours, rectangles is not None, scale, z[used], cells, beyond.tocsr(), added)
-
-
-def sides_of(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(s, 2) ends i < j of the sides of cells (m, k), each side once."""
-    return np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
-
-
-def _rectangles(
-    matrix: OperatorMatrix, grid: Grid, at: NDArray[np.int64], cells: NDArray[np.int64]
-) -> tuple[float, NDArray[np.complex128], NDArray[np.float64]] | None:
-    """c, positions (k,), and (G11, G22, G12) of each cell, (m, 3), of a grid of rectangles; None where it is none."""
-    sizes = None if grid.neighbours == 6 else steps(matrix, grid, cells[(cells < matrix.n).all(axis=1)])
-    if sizes is None:
+        products.append(factors)
+    (x, line_x, sum_y), (y, line_y, sum_x) = products
+    up, down = np.median(sum_y / (y[line_x] + y[line_x + 1])), np.median(sum_x / (x[line_y] + x[line_y + 1]))
+    s = float(2 * np.sign(up) * np.sqrt(up * down)) if up * down > 0 else 0.0
+    diagonals = [np.median(entries[whole & (grid.step == d)]) for d in range(2, len(kind.part))]
+    t = float(np.dot(np.sign(kind.part[2:, 2]), diagonals))
+    if not abs(s) > abs(t):
         return None
-    scale, x, y = sizes
-    column, row = (at - at.min(axis=0)).T
-    z = np.append(0.0, np.cumsum(x))[column] + 1j * np.append(0.0, np.cumsum(y))[row]
-    ratio = y[row[cells[:, 0]]] / x[column[cells[:, 0]]]
-    return scale, z, scale * np.column_stack([ratio, 1 / ratio, np.zeros(len(ratio))])
+    sizes = [x, y * np.sqrt(up / down)]
+    for axis in (0, 1):
+        for line, end, step in ((0, 0, 1), (len(sizes[axis]) - 2, -1, -2)):
+            rim = (grid.step == 1 - axis) & (start[:, axis] == line) & (number == 1)
+            along, cell = sizes[1 - axis][1 + start[rim, 1 - axis]], sizes[axis][step]
+            own, turned, skewed = kind.part[1 - axis, [1 - axis, axis, 2]]
+            rest = entries[rim] / s - own * cell / along - turned * along / cell - skewed * t / s
+            gone = np.abs(rest) > ALIKE * np.abs(entries[rim] / s)
+            # What a cell of a width r times the length of the edge adds: own r + turned / r + what is skewed.
+            half = rest[gone] - skewed * t / s
+            root = np.abs(half) + np.sqrt(half**2 - 4 * own * turned)
+            with np.errstate(invalid="ignore"):
+                ratio = np.where(half > 0, 2 * turned / root, root / (-2 * own))
+            if gone.any():
+                sizes[axis][end] = np.median(ratio * along[gone])
+    return (s, t, sizes[0], sizes[1]) if all((own > 0).all() for own in sizes) else None
 
 
-def _alike(
-    matrix: OperatorMatrix, grid: Grid, at: NDArray[np.int64], cells: NDArray[np.int64]
-) -> tuple[float, NDArray[np.complex128], NDArray[np.float64]] | None:
-    """c, positions (k,), and (G11, G22, G12) of each cell, (m, 3), where all are alike; None where they are not."""
-    kind = _KINDS[grid.neighbours]
-    whole = np.array([np.median(matrix.entries[grid.step == d]) for d in range(len(kind.stencil))])
-    tolerance = CERTIFIED * np.abs(whole).max()
-    if 2 * np.count_nonzero(np.abs(matrix.entries - whole[grid.step]) <= tolerance) < len(grid.step):
+def _factors(
+    i: NDArray[np.int64], j: NDArray[np.int64], value: NDArray[np.float64], n: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]] | None:
+    """Steps a (n + 2,), lines j and b there, with values b[j] / a[i]: up to a factor; None unless of one sign.
+
+    Steps that no value ties to most, and those at both ends, are as the nearest ones.
+    """
+    if not len(value) or not (np.sign(value) * np.sign(value[0]) > 0).all():
         return None
-    form = np.linalg.lstsq(kind.stencil, whole, rcond=None)[0]
-    xx, yy, xy = form.tolist()
-    if not xx * yy > xy**2 or (np.abs(kind.stencil @ form - whole) > tolerance).any():
+    pairs = sp.csr_array((value, (i, n + j)), shape=(n + int(j.max()) + 1,) * 2)
+    order, before = csgraph.breadth_first_order(pairs, np.bincount(i).argmax(), directed=False)
+    later = order[1:]
+    ratios = np.asarray((pairs + pairs.T)[later, before[later]])
+    size = np.full(pairs.shape[0], np.nan)
+    size[order[0]] = 1
+    for node, parent, ratio in zip(later.tolist(), before[later].tolist(), ratios.tolist(), strict=True):
+        size[node] = size[parent] * ratio if node >= n else size[parent] / ratio
+    a, b = size[:n], size[n:]
+    if (np.abs(b[j] / a[i] - value) > CERTIFIED * np.abs(value)).any():
         return None
-    scale = float(np.sign(xx) * np.sqrt(xx * yy - xy**2))
-    return scale, at @ np.array([1, (-xy + 1j * scale) / yy]), np.broadcast_to(form, (len(cells), 3))
-
-
-def _around(grid: Grid, kind: _Kind) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Coordinates of the rows, then of all vertices beside them; and all cells with a row among their corners."""
-    low, width = grid.at.min(axis=0) - 2, int(np.ptp(grid.at[:, 1])) + 4
-    corners = []
-    for shape in kind.corners:
-        anchors = (grid.at[:, None] - shape).reshape(-1, 2)
-        _, first = np.unique((anchors - low) @ [width, 1], return_index=True)
-        corners.append(anchors[first, None] + shape)
-    at = np.concatenate(corners)
-    wanted, own = (at - low) @ [width, 1], (grid.at - low) @ [width, 1]
-    order = np.argsort(own)
-    cells = order[np.searchsorted(own, wanted, sorter=order).clip(max=len(own) - 1)]
-    gone = own[cells] != wanted
-    _, first, ghost = np.unique(wanted[gone], return_index=True, return_inverse=True)
-    cells[gone] = len(own) + ghost
-    return np.concatenate([grid.at, at[gone][first]]), cells
+    known, lines = (np.flatnonzero(np.isfinite(part)) for part in (a, b))
+    return np.interp(np.arange(-1, n + 1), known, a[known]), lines, b[lines]
 
 
 def _present(
-    matrix: OperatorMatrix, kind: _Kind, parts: NDArray, area: NDArray, cells: NDArray
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    matrix: OperatorMatrix, cells: NDArray[np.int64], edge: NDArray[np.int64], parts: NDArray, diagonal: NDArray,
+    area: NDArray,
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:  # fmt: skip
     """Which cells there are, and what diagonal entries have besides, (n,): a multiple of a lumped mass matrix.
 
-    Cells add `parts`, (m, directions), to the entries of their edges, and have `area`, (m,), up to a common factor.
-    Where an entry is that of one cell only it is the one with more rows. Cells of a single row show in its diagonal
-    entry.
+    Cells add `parts`, (m, p), to the entries of `edge`, (m, p), -1 for none, and `diagonal`, (m, k), to those of their
+    corners, and have `area`, (m,), up to a factor. Where an entry is that of one cell only it is the one with more
+    rows. Cells of a single row show in its diagonal entry.
     """
     n, own = matrix.n, cells < matrix.n
-    rows, key = own.sum(axis=1), matrix.edges @ [n, 1]
-    tolerance = CERTIFIED * matrix.row_size
+    rows, tolerance = own.sum(axis=1), CERTIFIED * matrix.row_size
+    cell, pair = np.nonzero(edge >= 0)
+    at, part = edge[cell, pair], parts[cell, pair]
+    entry, near = matrix.entries[at], tolerance[matrix.edges[at]].min(axis=1)
+    shown = (np.abs(entry - part) <= near) & (2 * rows[cell] > np.bincount(at, rows[cell])[at])
+    shown |= np.abs(entry - np.bincount(at, part)[at]) <= near
     present = np.zeros(len(cells), dtype=bool)
-    diagonal = np.zeros(cells.shape)  # what each cell has of the diagonal entries of its corners
-    on_edge, both = np.zeros(len(key)), np.zeros(len(key))  # rows of all cells there, and what they add
-    ends = []
-    for p, q, d in kind.pairs:
-        diagonal[:, [p, q]] -= parts[:, [d]]
-        some = np.flatnonzero(own[:, p] & own[:, q])
-        edge, stored = found(key, pair_keys(n, cells[some, p], cells[some, q]))
-        some, edge = some[stored], edge[stored]
-        on_edge += np.bincount(edge, rows[some], len(key))
-        both += np.bincount(edge, parts[some, d], len(key))
-        ends.append((some, edge, parts[some, d]))
-    for some, edge, part in ends:
-        entry, near = matrix.entries[edge], tolerance[matrix.edges[edge]].min(axis=1)
-        alone = (np.abs(entry - part) <= near) & (2 * rows[some] > on_edge[edge])
-        present[some] |= (alone | (np.abs(entry - both[edge]) <= near)) & (np.abs(part) > near)
-    alone = ~present & (rows == 1)
+    present[cell[shown & (np.abs(part) > near)]] = True
     missing = np.bincount(cells[~present][own[~present]], minlength=n) > 0
     rest = matrix.diagonal - _sums(cells, diagonal, present, n)
     mass = np.broadcast_to(area[:, None], cells.shape)
     inside = _sums(cells, mass, present, n)
     density = np.median(rest[~missing] / inside[~missing]) if not missing.all() else 0.0
-    if (np.abs(density * inside) > tolerance)[~missing].any():
-        diagonal += density * mass
-        rest -= density * inside
-    else:
-        density = 0.0
-    present[alone] = (np.abs(rest - _sums(cells, diagonal, alone, n)) <= tolerance)[cells[alone].min(axis=1)]
-    # Where a boundary that is gone meets one that is not, some of them.
-    which = np.flatnonzero(alone)
-    at_row = Grouped(cells[which].min(axis=1), n)
-    wrong = np.abs(rest - _sums(cells, diagonal, present & alone, n)) > tolerance
-    for row in np.flatnonzero(wrong & (np.diff(at_row.start) > 0)).tolist():
-        here = which[at_row.order[at_row.start[row] : at_row.start[row + 1]]]
-        corner = cells[here].argmin(axis=1)
-        for chosen in product((False, True), repeat=len(here)):
-            if abs(rest[row] - diagonal[here, corner] @ chosen) <= tolerance[row]:
-                present[here] = chosen
+    density *= (np.abs(density * inside) > tolerance)[~missing].any()
+    diagonal, rest = diagonal + density * mass, rest - density * inside
+    alone = np.flatnonzero(~present & (rows == 1))
+    row, adds = cells[alone].min(axis=1), diagonal[alone, cells[alone].argmin(axis=1)]
+    at_row = Grouped(row, n)
+    for k in distinct(row).tolist():  # all of them, but where a boundary that is gone meets one that is not
+        here = at_row.order[at_row.start[k] : at_row.start[k + 1]]
+        for chosen in product((True, False), repeat=len(here)):
+            if abs(rest[k] - adds[here] @ chosen) <= tolerance[k]:
+                present[alone[here]] = chosen
                 break
     return present, density * _sums(cells, mass, present, n)
 
