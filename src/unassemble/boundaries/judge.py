@@ -26,6 +26,7 @@ from scipy.sparse import csgraph
 
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
+from ..tolerances import ROUNDED
 from ..topology import Piece
 from .fit import Scale, WholeEntries, jacobian_rows
 
@@ -130,7 +131,10 @@ class _Linearised:
             right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
             x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
             for _ in range(5):
-                x = x + preimage(right - self.jacobian @ x)
+                change = preimage(right - self.jacobian @ x)
+                x = x + change
+                if np.abs(change).max() <= ROUNDED * np.abs(x).max():
+                    break
             return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:

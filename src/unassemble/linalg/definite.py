@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
@@ -41,7 +40,7 @@ def nearly_singular(matrix: UpperTriangle, analysed: Factorisation | None = None
             data = matrix.data.copy()
             data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
             try:
-                solver.factorise(replace(matrix, data=data))
+                solver.factorise(matrix.with_data(data))
                 break
             except SolverError:  # rounding made a pivot vanish
                 continue
