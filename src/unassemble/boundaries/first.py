@@ -60,9 +60,9 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
     if 2 * band.sum() >= len(band) or not _upright(problem.piece, z):
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
-    for mu in _FADING[:-1]:
-        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, ((mu, 3),))
-        fit = problem.fit(z, fit.scale, rim.whole, mu, newton)
+    for mus in (_FADING[:2], _FADING[2:3]):
+        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, [(mu, 3) for mu in mus])
+        fit = problem.fit(z, fit.scale, rim.whole, mus[-1], newton)
     return fit
 
 

@@ -203,13 +203,18 @@ class WholeEntries:
         except SolverError:
             self.release()
             return None
+        system.response = None
         return self._solved(system)
 
     def _solved(self, system: System) -> tuple[NDArray, NDArray] | None:
         """The same with the factor that is there."""
         assert self._factor is not None
-        solved = self._factor.solve(np.column_stack([system.right, system.slope]))
-        gradient, response = solved[:, 0], solved[:, 1:]
+        if system.response is None:
+            solved = self._factor.solve(np.column_stack([system.right, system.slope]))
+            gradient, system.response = solved[:, 0], solved[:, 1:]
+        else:
+            gradient = self._factor.solve(system.right)
+        response = system.response
         left = system.size - system.slope.T @ response
         if not np.isfinite(left).all():
             return None
@@ -255,6 +260,7 @@ class System:
         self._slopes = trust[:, None] * problem.slopes(z, scale)
         self.slope = self.jacobian_transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
         self.size = self._slopes.T @ self._slopes
+        self.response: NDArray | None = None  # to the slope, once it is solved for
         self.towards(misfit, shape)
 
     def towards(self, misfit: NDArray, shape: NDArray) -> System:

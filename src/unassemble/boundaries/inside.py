@@ -24,7 +24,8 @@ _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
 # that any damping would hold them.
-_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
+_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.1, shortest=1.0)
+_STEP = replace(_NEWTON, last_steps=1)  # where a step costs more than what holds others up and is taken off after it
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +119,13 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     return flat if flat is not None and flat[0].misfit <= EXACT else found
 
 
-def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim] | None:
+def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, newton: FitOptions) -> tuple[Fit, Rim] | None:
     """A fit without the vertices of the rim, which bend nothing then; None where few entries are left, or it fails."""
     bare, found = rim.bared(), fit
     for _ in range(_ROUNDS):
         if bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, far inside there are three
             return None
-        found = problem.fit(found.z, found.scale, bare.whole, 0.0, _NEWTON)
+        found = problem.fit(found.z, found.scale, bare.whole, 0.0, newton)
         if found.misfit <= EXACT:
             break
         less = _less(problem, bare, found, peaks)
@@ -142,7 +143,7 @@ def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: floa
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
         if turn < patience:
             fit = _tried(problem, rim, fit, peaks)
-        elif fit.misfit > EXACT and (bare := _bare(problem, rim, fit, peaks)):
+        elif fit.misfit > EXACT and (bare := _bare(problem, rim, fit, peaks, _NEWTON if patience else _STEP)):
             return bare
         if fit.misfit <= EXACT:
             break

@@ -16,7 +16,7 @@ needed, and one factorisation is all there is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..errors import GeometryError
-from ..linalg import UpperTriangle, nearly_singular
+from ..linalg import Factorisation, UpperTriangle, nearly_singular
+from ..tolerances import ROUNDED
 from ..topology import Piece
 from ..words import count_of
 from .fit import Scale, WholeEntries, jacobian_rows
@@ -41,15 +42,17 @@ def determined(
     """
     piece = problem.piece
     jacobian = jacobian_rows(piece.n_vertices, [(problem.gradient(z, scale), piece.stencil)])
-    return determined_by(jacobian, problem.slopes(z, scale), whole, z, piece)
+    return determined_by(jacobian, problem.slopes(z, scale), whole, z, piece, problem.analysed)
 
 
 def determined_by(
-    jacobian: sp.bsr_array, slopes: NDArray, whole: NDArray[np.bool_], z: NDArray, piece: Piece
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    jacobian: sp.bsr_array, slopes: NDArray, whole: NDArray[np.bool_], z: NDArray, piece: Piece,
+    analysed: Callable[[UpperTriangle], Factorisation] | None = None,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
     """The same by the derivatives of entries, (e, 2 n) in blocks of x and y, and theirs by log c, (e, k).
 
-    Of the piece only its edges and its boundary matter, between the n vertices.
+    Of the piece only its edges and its boundary matter, between the n vertices. With what has analysed the pattern of
+    the normal matrix already.
     """
     n = len(z)
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
@@ -62,7 +65,7 @@ def determined_by(
     slopes = np.where(whole[:, None], slopes, 0.0)
     basis = np.linalg.qr(slopes[:, slopes.any(axis=0)])[0]
     try:
-        checked, free = _Linearised(scaled, basis, whole, held).judged()
+        checked, free = _Linearised(scaled, basis, whole, held).judged(analysed)
     except GeometryError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
@@ -116,7 +119,9 @@ class _Linearised:
     entries: NDArray[np.bool_]
     held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
 
-    def judged(self) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+    def judged(
+        self, analysed: Callable[[UpperTriangle], Factorisation] | None
+    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
         The inverse is that of J'J, made definite by a small shift: eigenvalues less than some hundred times as large
@@ -124,7 +129,8 @@ class _Linearised:
         projected out, which is a matter of low rank.
         """
         transposed = self.jacobian.T.tobsr()
-        with nearly_singular(UpperTriangle.of(transposed @ self.jacobian)) as solver:
+        normal = UpperTriangle.of(transposed @ self.jacobian)
+        with nearly_singular(normal, analysed and analysed(normal)) as solver:
             pull = transposed @ self.slope
             response = solver.solve(pull) if pull.size else pull
             left = self.slope.T @ self.slope - pull.T @ response
@@ -142,7 +148,10 @@ class _Linearised:
             right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
             x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
             for _ in range(5):
-                x = x + preimage(right - self.jacobian @ x)
+                change = preimage(right - self.jacobian @ x)
+                x = x + change
+                if np.abs(change).max() <= ROUNDED * np.abs(x).max():
+                    break
             return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
@@ -21,8 +20,10 @@ STEPS = 3
 
 
 @contextmanager
-def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
+def nearly_singular(matrix: UpperTriangle, analysed: Factorisation | None = None) -> Iterator[Factorisation]:
     """Cholesky factor of a real semidefinite matrix plus the least multiple of the identity that rounding allows.
+
+    With an analysis of the pattern that is there already, which stays with who made it.
 
     Raises GeometryError if a pivot vanishes even with the largest.
     """
@@ -33,22 +34,24 @@ def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
     # Unknowns in no equation are stored with less.
     there = diagonal > np.finfo(float).eps ** 2 * diagonal.max(initial=0.0)
     typical = float(np.median(diagonal[there])) if there.any() else 1.0
-    for shift in _SHIFTS:
-        data = matrix.data.copy()
-        data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
-        shifted = replace(matrix, data=data)
-        solver = factorisation(shifted, definite=True)
-        try:
-            solver.factorise(shifted)
-        except SolverError:  # rounding made a pivot vanish
+    solver = analysed or factorisation(matrix, definite=True)
+    try:
+        for shift in _SHIFTS:
+            data = matrix.data.copy()
+            data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
+            try:
+                solver.factorise(matrix.with_data(data))
+                break
+            except SolverError:  # rounding made a pivot vanish
+                continue
+        else:
+            raise GeometryError(
+                "the normal matrix of the equations is not positive; the entries may differ too much in size"
+            )
+        yield solver
+    finally:
+        if analysed is None:
             solver.release()
-            continue
-        try:
-            yield solver
-        finally:
-            solver.release()
-        return
-    raise GeometryError("the normal matrix of the equations is not positive; the entries may differ too much in size")
 
 
 def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:

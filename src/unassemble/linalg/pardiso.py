@@ -11,7 +11,6 @@ import os
 import re
 import sys
 import threading
-from dataclasses import replace
 from enum import IntEnum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
@@ -116,7 +115,7 @@ class PardisoFactorisation:
         # Next to such entries and rows of zeros pivots overflow, and a segmentation fault follows.
         tiny = (sizes > 0) & (sizes < max(np.finfo(float).eps ** 2 * size, 1e-100))
         if tiny.any():
-            matrix = replace(matrix, data=np.where(tiny, 0, matrix.data))
+            matrix = matrix.with_data(np.where(tiny, 0, matrix.data))
             seen = np.zeros(matrix.n, dtype=bool)
             filled = (matrix.data != 0).reshape(len(matrix.data), -1).any(axis=1)
             seen[matrix.indices[filled]] = seen[np.repeat(np.arange(matrix.n), np.diff(matrix.indptr))[filled]] = True

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,12 +45,13 @@ class UpperTriangle:
             upper = sp.csr_array(sp.triu(matrix, format="csr"))
             upper.sort_indices()
             return cls(upper.data, upper.indices, upper.indptr)
-        matrix.sort_indices()
         n = len(matrix.indptr) - 1
-        row = np.repeat(np.arange(n), np.diff(matrix.indptr))
-        upper = matrix.indices >= row
-        indptr = np.append(0, np.cumsum(np.bincount(row[upper], minlength=n)))
-        return cls(matrix.data[upper], matrix.indices[upper], indptr)
+        row = np.repeat(np.arange(n, dtype=np.int32), np.diff(matrix.indptr))
+        kept = np.flatnonzero(matrix.indices >= row)
+        indptr = np.append(0, np.cumsum(np.bincount(row[kept], minlength=n)))
+        half = sp.bsr_array((matrix.data[kept], matrix.indices[kept], indptr), shape=matrix.shape)
+        half.sort_indices()
+        return cls(half.data, half.indices, half.indptr)
 
     @property
     def n(self) -> int:
@@ -63,7 +65,9 @@ class UpperTriangle:
 
     def with_data(self, data: NDArray) -> UpperTriangle:
         """The same pattern with other entries."""
-        return replace(self, data=data)
+        other = copy(self)  # whose pattern needs no second look
+        object.__setattr__(other, "data", data)
+        return other
 
     def full(self) -> sp.csc_array:
         """Both triangles."""

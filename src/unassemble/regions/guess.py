@@ -71,10 +71,12 @@ def corners_of(piece: Piece) -> sp.csr_array:
 
 def _medians(graph: sp.csr_array, values: NDArray) -> NDArray[np.float64]:
     """(m,) medians over the neighbours of each, itself among them."""
-    count = np.diff(graph.indptr)
-    near = values[graph.indices]
-    near = near[np.lexsort((near, np.repeat(np.arange(len(values)), count)))]
-    return np.asarray(near[graph.indptr[:-1] + count // 2])
+    order = np.argsort(values)
+    rank = np.empty(len(order), dtype=graph.indices.dtype)
+    rank[order] = np.arange(len(order))
+    ranked = sp.csr_array((graph.data, rank[graph.indices], graph.indptr), shape=graph.shape)
+    ranked.sort_indices()
+    return np.asarray(values[order[ranked.indices[graph.indptr[:-1] + np.diff(graph.indptr) // 2]]])
 
 
 def _valleys(values: NDArray) -> NDArray[np.float64]:
