@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri, asm, enforce
-from skfem.models import laplace
+from skfem.models import laplace, mass
 
 from meshes import largest_error
 from unassemble import ConformingMesh, RecoveryError, recover
@@ -128,6 +128,18 @@ def test_a_lumped_mass_matrix_added(density):
     added = sp.diags_array([density * mass[tuple(at)] for at in mesh.p.T[inside].tolist()])
     found = check(matrix[inside][:, inside] + added, mesh.p.T[inside], known=len(inside))
     assert "a multiple of the lumped mass matrix was added" in " ".join(found.warnings)
+
+
+def test_a_consistent_mass_matrix_added():
+    """On triangles that are all alike it is that of another lattice, and a multiple of the identity."""
+    _, mesh = assembled("P1", UNIFORM)
+    basis = Basis(mesh, ElementTriP1())
+    inside = mesh.interior_nodes()
+    matrix = sp.csr_array(asm(laplace, basis) + 0.1 * asm(mass, basis))
+    found = recover(shuffled(matrix[inside][:, inside], mesh.p.T[inside])[0])
+    assert found.certified
+    assert found.uniqueness == "ambiguous"
+    assert "with a consistent mass matrix in its place triangles of other shapes" in " ".join(found.warnings)
 
 
 def test_a_step_and_a_hole():

@@ -75,3 +75,5 @@ def test_triangles_by_their_sides():
     np.testing.assert_allclose(angles(sides[:1])[0, 2], np.pi / 2)
     step = longest_step(sides[1:2], np.array([[0.0, 0.0, 1.0]]))
     assert heron(sides[1:2] + step * np.array([[0.0, 0.0, 1.0]]))[0] == pytest.approx(0, abs=1e-9)
+    near = np.random.default_rng(0).uniform(1, 1.4, size=(99, 3))
+    np.testing.assert_allclose(longest_step(near, -2 * near), 0.5)  # a point

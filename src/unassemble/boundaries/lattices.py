@@ -104,6 +104,8 @@ def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
         alike = (np.abs(lattice.added - size) <= CERTIFIED * np.abs(size)).all()
         what = f"{size:.6g} times the identity" if alike else "a multiple of the lumped mass matrix"
         notes.append(f"{what} was added to the matrix")
+        if lattice.cells.shape[1] == 3:  # whose own entries are those of another lattice
+            notes[-1] += "; with a consistent mass matrix in its place triangles of other shapes fit as well"
     if k := int((status == 2).sum()):
         notes.append(
             f"{count_of(k, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to corners, "

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import ROUNDED
+
 # d(u_1 + u_2 - u_0)/du and so on: sums that are four areas times the cotangents.
 _SIGNS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1]], dtype=np.float64)
 
@@ -35,7 +37,9 @@ def longest_step(sides: NDArray, change: NDArray) -> NDArray[np.float64]:
 
     constant, half, square = heron(sides), product(sides, change), product(change, change)
     with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.sqrt(half**2 - constant * square) - half  # not a number where the area never vanishes
+        root = half**2 - constant * square
+        root = np.sqrt(np.where(np.abs(root) <= ROUNDED * half**2, 0, root))  # where all sides shrink alike it is 0
+        slope = root - half  # not a number where the area never vanishes
         return np.where(slope > 0, constant / slope, np.inf)
 
 
