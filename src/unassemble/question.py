@@ -17,7 +17,7 @@ from .options import FrameOptions, OperatorOptions, ScalarOptions
 from .outputs import PlanarMesh, Recovery, Surface
 from .readings import ScalarReadings
 from .scalar.placement import Placement
-from .tolerances import LARGEST_NOISE, ROUNDED
+from .tolerances import LARGEST_NOISE
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +133,8 @@ class Question:
 
     def _as_certified_surface(self) -> Surface | None:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
-        if np.ptp(self.matrix.entries) <= ROUNDED * self.matrix.row_size.max():
-            return None  # the Laplacian of a graph, most likely
+        if self.matrix.alike:
+            return None
         try:
             found = self._lengths()
         except (RecoveryError, InputError):  # options may be for planar meshes only

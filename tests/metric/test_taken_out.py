@@ -12,6 +12,8 @@ from unassemble import RecoveryError, recover
 def test_the_knot_of_pyamg():
     """A row is gone. It is the Laplacian of the graph, so that the lengths are those of equal triangles."""
     example = pyamg.gallery.load_example("knot")
+    with pytest.raises(RecoveryError, match="operator='surface'"):  # which nothing else speaks for
+        recover(example["A"])
     found = recover(example["A"], operator="surface")
     left = example["elements"][(example["elements"] < found.n_points).all(axis=1)]
     assert found.status == "ambiguous"

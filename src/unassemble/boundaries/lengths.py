@@ -47,7 +47,6 @@ class _Metric:
     curvature: NDArray[np.float64]  # (inner vertices,) 2 pi less the sum of angles
     bulge: NDArray[np.float64]  # (p,) of the prior
     hessian: sp.csr_array  # (e, e) of areas, by log u
-    turn: sp.csr_array  # (inner vertices, e) of the curvature, by log u
 
     @property
     def bent(self) -> float:
@@ -161,21 +160,25 @@ class _Lengths:
         area, cotangents = areas_cotangents(own)
         ones = np.ones(len(area))
         blocks = -2 * blocks_of(own, area, cotangents, ones, -ones)
-        # An angle, by the logarithms of squared lengths: of the sides at it minus half a cotangent of the third angle,
-        # and of the one that faces it what makes the sum zero.
+        size, row, column = len(u), np.repeat(self.sides, 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
+        hessian = sp.csr_array((blocks.ravel(), (row, column)), shape=(size, size))
+        total = np.bincount(self.triangles.ravel(), angles(own).ravel(), len(self._number))[self.inside]
+        curvature = np.asarray(2 * np.pi - total, dtype=np.float64)
+        weights = summed(self.sides, cotangents / 2, len(u))
+        return _Metric(u, scale, weights, curvature, self.prior @ np.log(u), hessian)
+
+    def turn(self, u: NDArray) -> sp.csr_array:
+        """Derivatives of the curvature inside by log u."""
+        cotangents = areas_cotangents(u[self.sides])[1]
+        # An angle: by the sides at it minus half a cotangent of the third angle, and by the one that faces it what
+        # makes the sum zero.
         total = cotangents.sum(axis=1)
         turn = (cotangents[:, :, None] + cotangents[:, None, :] - total[:, None, None]) / 2
         corner = np.arange(3)
         turn[:, corner, corner] = (total[:, None] - cotangents) / 2
-        size, row, column = len(u), np.repeat(self.sides, 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
-        hessian = sp.csr_array((blocks.ravel(), (row, column)), shape=(size, size))
-        row = np.repeat(self._number[self.triangles], 3, axis=1).ravel()
+        row, column = np.repeat(self._number[self.triangles], 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
         some = row >= 0
-        turned = sp.csr_array((-turn.ravel()[some], (row[some], column[some])), shape=(len(self.inside), size))
-        total = np.bincount(self.triangles.ravel(), angles(own).ravel(), len(self._number))[self.inside]
-        curvature = np.asarray(2 * np.pi - total, dtype=np.float64)
-        weights = summed(self.sides, cotangents / 2, len(u))
-        return _Metric(u, scale, weights, curvature, self.prior @ np.log(u), hessian, turned)
+        return sp.csr_array((-turn.ravel()[some], (row[some], column[some])), shape=(len(self.inside), len(u)))
 
     def convex(self, u: NDArray, scale: float) -> _Metric | None:
         """With whole entries, lengths of other edges given; None where there is none."""
@@ -241,7 +244,8 @@ class _Lengths:
         e, free = len(self.edges), np.flatnonzero(self.whole)
         slope = self.given[free] / here.scale if free_scale else np.zeros(len(free))
         rows = sp.hstack([sp.diags_array(1 / here.u[free]) @ here.hessian[free], sp.csr_array(slope[:, None])])
-        square = here.turn.T @ here.turn + mu**2 * (self.prior.T @ self.prior)
+        turn = self.turn(here.u)
+        square = turn.T @ turn + mu**2 * (self.prior.T @ self.prior)
         own = np.append(np.where(self.whole, 1e-12, damping), 1e-12 if free_scale else 1.0)
         square = sp.block_diag([square, sp.csr_array((1, 1))]) + sp.diags_array(own)
         room = np.append(np.zeros(e + 1), np.full(len(free), 1e-6))
@@ -251,7 +255,7 @@ class _Lengths:
         solver.factorise(upper)
         self.left -= 1
         right = np.zeros(len(room))
-        right[:e] = -(here.turn.T @ here.curvature) - mu**2 * (self.prior.T @ here.bulge)
+        right[:e] = -(turn.T @ here.curvature) - mu**2 * (self.prior.T @ here.bulge)
         right[e + 1 :] = self.given[free] / here.scale - here.weights[free]
         x = np.zeros(len(room))
         for _ in range(6):

@@ -82,6 +82,8 @@ def _of_kind(kind: str, name: str, shown: str, sums: Sums) -> Diagnosis:
 
 def _where_nothing_fits(found: Diagnosis, matrix: OperatorMatrix) -> str:
     """What to do about a matrix whose graph is that of cells which are read, while no mesh has its entries."""
+    if found.kind == "surface" and matrix.alike:
+        return "all entries are equal, as on triangles with equal sides: `operator='surface'` takes them for such"
     return found.advice or (TERMS if Sums.of(matrix).rest.any() else CONSTANT)
 
 

@@ -56,10 +56,14 @@ class OperatorMatrix:
         return np.asarray(np.abs(self.row_sums) <= SUMMED * (np.abs(self.diagonal) + self.couplings))
 
     @property
+    def alike(self) -> bool:
+        """Whether all entries are equal: then the matrix is the Laplacian of a graph, most likely."""
+        return len(self.entries) > 0 and bool(np.ptp(self.entries) <= ROUNDED * np.abs(self.entries).max())
+
+    @property
     def unweighted(self) -> bool:
         """Whether all entries are equal and all rows add up to zero: the numbers tell no cell from a hole."""
-        alike = len(self.entries) > 0 and np.ptp(self.entries) <= ROUNDED * np.abs(self.entries).max()
-        return bool(alike and self.adds_up.all())
+        return self.alike and bool(self.adds_up.all())
 
     @property
     def incomplete_rows(self) -> NDArray[np.bool_]:

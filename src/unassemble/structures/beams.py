@@ -43,6 +43,8 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     off.eliminate_zeros()
     if order < 4 or np.diff(off.indptr).max(initial=0) > MOST or (matrix.diagonal() <= 0).any():
         return None
+    if not (off.data > 0).any():  # rotations of a member have a positive entry
+        return None
     w, t, steps = _members(off)
     deflections, partner = np.unique(w), np.full(order, -1)
     partner[w] = t
