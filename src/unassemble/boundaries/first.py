@@ -18,6 +18,7 @@ from .rim import Rim
 
 # Weights of the prior, one after the other, and once more.
 _FADING = (0.1, 0.01, 1e-3, 0.0)
+_LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
 SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
@@ -60,9 +61,11 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
     if 2 * band.sum() >= len(band) or not _upright(problem.piece, z):
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
-    for mus in (_FADING[:2], _FADING[2:3]):
-        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, [(mu, 3) for mu in mus])
-        fit = problem.fit(z, fit.scale, rim.whole, mus[-1], newton)
+    first, second, third = ((mu, 3) for mu in _FADING[:-1])
+    large = problem.piece.n_vertices >= _LARGE
+    for turn in ([first, second], [third]) if large else ([first], [second], [third]):
+        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, turn)
+        fit = problem.fit(z, fit.scale, rim.whole, turn[-1][0], newton)
     return fit
 
 
