@@ -65,6 +65,11 @@ class Lattice:
     beyond: sp.csr_array  # (n, g) entries that rows had in columns that are gone
     added: NDArray[np.float64]  # (n,) what diagonal entries have besides: a multiple of the area of the cells at a row
 
+    @property
+    def like_mass(self) -> bool:
+        """Whether what diagonal entries have besides is that of a consistent mass matrix on another lattice, too."""
+        return self.cells.shape[1] == 3 and bool(self.added.any())
+
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:
         """The lattice that a matrix may belong to; None where its graph is no grid, or no sizes of cells fit."""

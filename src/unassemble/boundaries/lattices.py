@@ -79,7 +79,7 @@ def recover_lattice(
         points=mesh.points,
         hinges=topology.hinges,
         node_status=status,
-        status="certified",
+        status="ambiguous" if lattice.like_mass else "certified",
         uniqueness="ambiguous",
         reason=(
             f"the grid, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
@@ -104,7 +104,7 @@ def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
         alike = (np.abs(lattice.added - size) <= CERTIFIED * np.abs(size)).all()
         what = f"{size:.6g} times the identity" if alike else "a multiple of the lumped mass matrix"
         notes.append(f"{what} was added to the matrix")
-        if lattice.cells.shape[1] == 3:  # whose own entries are those of another lattice
+        if lattice.like_mass:
             notes[-1] += "; with a consistent mass matrix in its place triangles of other shapes fit as well"
     if k := int((status == 2).sum()):
         notes.append(
