@@ -172,8 +172,9 @@ class WholeEntries:
             small = small + 1 if cost > (1 - 1e-3) * before else 0
             if small >= (1 if mu else 4) or share < options.shortest:
                 break
-        reach = 4 * np.spacing(np.abs(z - z[0]).max()) * np.abs(self.gradient(z, scale)).sum(axis=0)
-        beyond = np.maximum(np.abs(misfit) - reach, 0)[whole]  # what rounding of positions does not leave
+        # What rounding of positions does not leave, which is next to nothing while there is a prior.
+        reach = 0.0 if mu else 4 * np.spacing(np.abs(z - z[0]).max()) * np.abs(self.gradient(z, scale)).sum(axis=0)
+        beyond = np.maximum(np.abs(misfit) - reach, 0)[whole]
         rest, size = float(np.linalg.norm(beyond)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e", mu, rest, size)
         return Fit(z, scale, rest, size)
