@@ -215,13 +215,12 @@ class WholeEntries:
             gradient, system.response = solved[:, 0], solved[:, 1:]
         else:
             gradient = self._factor.solve(system.right)
-        response = system.response
-        left = system.size - system.slope.T @ response
+        left = system.size - system.slope.T @ system.response
         if not np.isfinite(left).all():
             return None
         np.fill_diagonal(left, np.maximum(left.diagonal(), 1e-12 * system.size.diagonal()))
         move = np.linalg.lstsq(left, system.along - system.slope.T @ gradient, rcond=None)[0]
-        step = np.ascontiguousarray(gradient - response @ move).view(np.complex128)
+        step = np.ascontiguousarray(gradient - system.response @ move).view(np.complex128)
         step = np.append(step, 0)[np.where(self.free, self.place, len(step))]
         return (step, move) if np.isfinite(step).all() and np.isfinite(move).all() else None
 
