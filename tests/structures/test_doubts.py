@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from as_given import written
-from built import assembled, error, frame, grid, model_on, plane_frame, plate, rows_per_node, shell, sound, truss
+from built import (
+    add_members,
+    assembled,
+    error,
+    frame,
+    grid,
+    model_on,
+    plane_frame,
+    plate,
+    rows_per_node,
+    shell,
+    sound,
+    truss,
+)
 
 from unassemble import RecoveryError, recover
 from unassemble.structures import pieces
@@ -143,3 +156,38 @@ def test_joints_in_one_place_prove_nothing():
     given = truss(3, 7, seed).permuted(seed)
     kept = np.setdiff1d(np.arange(21), [4, 6, 7])
     assert recover(given.matrix[kept][:, kept]).status == "uncertified"
+
+
+def warren():
+    """A truss without a bar to spare."""
+    points = np.column_stack([np.arange(6.0), np.arange(6) % 2 * 0.8])
+    points += np.random.default_rng(0).uniform(-0.2, 0.2, points.shape)
+    ends = np.array([(i, i + step) for i in range(6) for step in (1, 2) if i + step < 6])
+    model = model_on(points)
+    add_members(model, ends, 0, pinned=True)
+    return assembled(model, points, ends).only(range(2), 2)
+
+
+@pytest.mark.parametrize("held", [[], [0, 1, 10]], ids=["free", "supported"])
+def test_a_determinate_truss(held):
+    """At the pin and the roller the diagonal blocks of neighbours leave a bar over."""
+    given, kept = warren(), np.setdiff1d(np.arange(12), held)
+    found = recover(given.matrix[kept][:, kept], numbering=(kept // 2, kept % 2))
+    known = found.node_status == 0
+    assert found.certified
+    assert known.sum() >= len(known) - 1
+    assert error(found.points[known], given.points[np.unique(kept // 2)][known], scaled=True) < 1e-10
+
+
+@pytest.mark.parametrize("what", ["signs", "one entry"])
+def test_diagonal_blocks_contradict_wrong_bars_of_a_determinate_truss(what):
+    """Any directions fit some joints."""
+    given = warren()
+    upper = sp.triu(given.matrix, 1).tocoo()
+    last = (upper.row == 9) & (upper.col == 11)
+    upper.data = -np.abs(upper.data) if what == "signs" else np.where(last, 1e12, 1) * upper.data
+    damaged = upper + upper.T + sp.diags_array(given.matrix.diagonal())
+    found = recover(damaged, numbering="interleaved", block_size=2)
+    known = found.node_status == 0
+    assert found.operator == "truss"
+    assert not found.certified or error(found.points[known], given.points[known], scaled=True) < 1e-10

@@ -36,7 +36,7 @@ class Bars(NamedTuple):
     ends: NDArray[np.int64]  # (m, 2) nodes, the lesser first
     directions: NDArray[np.float64]  # (m, d) unit vectors, sign arbitrary
     known: NDArray[np.bool_]  # False where both ends lack unknowns, so that only a part of the direction shows
-    whole: NDArray[np.bool_]  # False where one end lacks unknowns
+    sure: NDArray[np.bool_]  # whose blocks are whole, and vouched for by the diagonal block of an end
 
 
 def bars_of(nodal: NodalMatrix, allowed: float = CANCELLED) -> Bars | None:
@@ -64,7 +64,20 @@ def bars_of(nodal: NodalMatrix, allowed: float = CANCELLED) -> Bars | None:
     pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
     if spread[0] < CANCELLED or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
         return None
-    return Bars(np.column_stack([i, j]), directions, known, both)
+    vouched = _balanced(nodal, whole, -allowed if pulls.any() else allowed)
+    return Bars(np.column_stack([i, j]), directions, known, both & (vouched[i] | vouched[j]))
+
+
+def _balanced(nodal: NodalMatrix, whole: NDArray, allowed: float) -> NDArray[np.bool_]:
+    """(n,) nodes whose blocks with whole nodes add up to nothing, or to bars that support one in some directions only.
+
+    A negative `allowed` is for matrices of the other sign.
+    """
+    size = np.where(nodal.node == nodal.indices, np.inf, np.linalg.norm(nodal.data, axis=(1, 2)))
+    there = nodal.data * whole[nodal.indices][:, None, None]
+    left = np.sign(allowed) * np.add.reduceat(there, nodal.indptr[:-1], axis=0)
+    least = np.linalg.eigvalsh((left + left.transpose(0, 2, 1)) / 2)[:, 0]
+    return np.asarray(np.abs(least) <= abs(allowed) * np.minimum.reduceat(size, nodal.indptr[:-1]))
 
 
 def truss_numbering(
@@ -146,9 +159,7 @@ def _verdict(error: float, found: Placed, known: Known, rounding: Rounding | Non
     if not (error <= (rounding.spread if rounding else CERTIFIED) and known.explained):
         return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
     if found.unnoticed.any():
-        return "uncertified", Reason(
-            "supports leave parts of bars only, and nothing contradicts other directions of these"
-        )
+        return "uncertified", Reason("nothing in the matrix contradicts other directions of some bars")
     if known.error > (rounding.needed if rounding else ALIKE):
         return "uncertified", Reason(
             f"the directions of the bars contradict each other by {found.residual:.1e}: positions are known to about "
@@ -163,10 +174,11 @@ def _verdict(error: float, found: Placed, known: Known, rounding: Rounding | Non
 def _place_joints(bars: Bars, n: int, allowed: float) -> Placed:
     """Find positions for which all bars have their directions.
 
-    Whole blocks are those of bars or not, but a block of which only one row or column is left is that of a bar for any
-    numbers: bars that only such blocks tell of count where others would contradict their directions.
+    A block of which only one row or column is left is that of a bar for any numbers, and whole blocks are those of
+    other bars if numbers are wrong, unless the diagonal block of an end contradicts: bars that only such blocks tell of
+    count where others would contradict their directions.
     """
-    ends, directions, whole = bars.ends[bars.known], bars.directions[bars.known], bars.whole[bars.known]
+    ends, directions, sure = bars.ends[bars.known], bars.directions[bars.known], bars.sure[bars.known]
     m, d = directions.shape
     across = np.eye(d) - directions[:, :, None] * directions[:, None, :]
     # What a field moves the ends of each bar against each other across its direction.
@@ -177,7 +189,7 @@ def _place_joints(bars: Bars, n: int, allowed: float) -> Placed:
         points, evidence, probes = up_to_size(piece, d)
         which = piece.rows[::d] // d
         seen = across[which] @ probes.reshape(len(which), d, -1)
-        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < SMALL)
+        blind = ~sure[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < SMALL)
         return points, replace(evidence, rows=len(which)), np.repeat(blind, d)
 
     return without_free(placed(operator, d, ends, solve, allowed), d + 1)
