@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -178,6 +178,18 @@ class WholeEntries:
         rest, size = float(np.linalg.norm(beyond)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e", mu, rest, size)
         return Fit(z, scale, rest, size)
+
+    def moved(self, fit: Fit, whole: NDArray[np.bool_], step: NDArray[np.complex128]) -> Fit:
+        """Positions displaced by a step (n,), with the factors that are best then, if whole entries fit no worse."""
+
+        def misfit(z: NDArray, scale: Scale) -> NDArray:
+            return np.where(whole, self.misfits(z, scale), 0.0)
+
+        z = fit.z + step
+        slopes = np.where(whole[:, None], self.slopes(z, fit.scale), 0.0)
+        scale = self._scaled(fit.scale, np.linalg.lstsq(slopes, misfit(z, fit.scale), rcond=None)[0])
+        better = np.linalg.norm(misfit(z, scale)) < np.linalg.norm(misfit(fit.z, fit.scale))
+        return replace(fit, z=z, scale=scale) if better else fit
 
     def faded(self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
         """One fit after the other, with less and less prior."""

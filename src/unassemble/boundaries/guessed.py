@@ -76,7 +76,7 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
             w = fit.entries.weights(fit.z)
             jacobian = fit.entries.jacobian(fit.z, np.ones(len(w))).matrix
             slopes = np.zeros((len(w), 0)) if scale is not None else w[:, None]
-            known, used = determined_by(jacobian, slopes, whole, fit.z, part.piece)
+            known, used, _ = determined_by(jacobian, slopes, whole, fit.z, part.piece, fit.misfit / fit.scale)
             twins = _twins(part, weights / fit.scale, whole, near[part.piece.vertices])
             known &= ~twins[: part.n_corners]
             return FittedPart(fit, known, whole, used, twins)

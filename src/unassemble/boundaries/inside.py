@@ -94,11 +94,10 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
             fit, rim = _grown(problem, fit, rim, held)
         if rim.whole.sum() < enough:
             fit, rim = _grown_by_sets(problem, fit, rim)
-        last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
-        fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
     if exact:
-        known, entries = determined(problem, fit.z, fit.scale, rim.whole)
+        known, entries, step = determined(problem, fit.z, fit.scale, rim.whole)
+        fit = problem.moved(fit, rim.whole, step)  # what is left is rounding
     scale, region = np.atleast_1d(fit.scale) * unit, problem.region
     region = np.zeros(len(problem.piece.triangles), np.int64) if region is None else region
     if entries.sum() <= unknowns(known, 0 if problem.known_scale is not None else len(scale)):
@@ -196,7 +195,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         bad = grown.whole & ~(relative <= 1e-12)
         _log.debug("grown to %d whole entries: %d do not fit", grown.whole.sum(), bad.sum())
         if not bad.any():
-            break
+            return replace(core, z=z), grown
         less = grown.peeled(np.where(bad, relative, 0.0), 0.0, keep=keep)
         if less is None or not less.whole.any():
             return core, rim

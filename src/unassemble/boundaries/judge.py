@@ -35,21 +35,23 @@ from .fit import Scale, WholeEntries, jacobian_rows
 
 def determined(
     problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.complex128]]:
     """Vertices (n,), up to a similarity of all of them, and entries (e,) that determine and check them.
 
-    At positions z and a scale with which whole entries, (e,) bool, fit.
+    At positions z and a scale with which whole entries, (e,) bool, fit, but for what one more step of Gauss and Newton
+    leaves of their misfits: last are the displacements (n,) of that.
     """
     piece = problem.piece
     jacobian = jacobian_rows(piece.n_vertices, [(problem.gradient(z, scale), piece.stencil)])
-    return determined_by(jacobian, problem.slopes(z, scale), whole, z, piece, problem.analysed)
+    misfit = problem.misfits(z, scale)
+    return determined_by(jacobian, problem.slopes(z, scale), whole, z, piece, misfit, problem.analysed)
 
 
 def determined_by(
-    jacobian: sp.bsr_array, slopes: NDArray, whole: NDArray[np.bool_], z: NDArray, piece: Piece,
+    jacobian: sp.bsr_array, slopes: NDArray, whole: NDArray[np.bool_], z: NDArray, piece: Piece, misfit: NDArray,
     analysed: Callable[[UpperTriangle], Factorisation] | None = None,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
-    """The same by the derivatives of entries, (e, 2 n) in blocks of x and y, and theirs by log c, (e, k).
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.complex128]]:  # fmt: skip
+    """The same by the derivatives of entries, (e, 2 n) in blocks of x and y, theirs by log c, (e, k), and misfits (e,).
 
     Of the piece only its edges and its boundary matter, between the n vertices. With what has analysed the pattern of
     the normal matrix already.
@@ -65,16 +67,16 @@ def determined_by(
     slopes = np.where(whole[:, None], slopes, 0.0)
     basis = np.linalg.qr(slopes[:, slopes.any(axis=0)])[0]
     try:
-        checked, free = _Linearised(scaled, basis, whole, held).judged(analysed)
+        checked, free, step = _Linearised(scaled, basis, whole, held).judged(misfit * whole, analysed)
     except GeometryError:
-        checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
+        checked, free, step = np.zeros_like(whole), np.zeros((n, 0), np.complex128), np.zeros(n, np.complex128)
     if not checked.any():
-        return np.zeros(n, dtype=bool), checked
+        return np.zeros(n, dtype=bool), checked, step * size
     held = np.zeros(n, dtype=bool)
     held[jacobian.indices[checked[row]]] = True
     vertices = _moving_alike(piece, z, free * size[:, None], size, held)
     loose = np.bincount(row, ~vertices[jacobian.indices], len(whole)) > 0
-    return vertices, checked & ~loose
+    return vertices, checked & ~loose, step * size
 
 
 def unknowns(known: NDArray[np.bool_], factors: int) -> int:
@@ -120,9 +122,11 @@ class _Linearised:
     held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
 
     def judged(
-        self, analysed: Callable[[UpperTriangle], Factorisation] | None
-    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+        self, misfit: NDArray[np.float64], analysed: Callable[[UpperTriangle], Factorisation] | None
+    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
+
+        And (n,) those that leave least of a misfit (e,).
 
         The inverse is that of J'J, made definite by a small shift: eigenvalues less than some hundred times as large
         count as zero, so that a larger one, which slivers ask for, counts more as free. With c free its columns are
@@ -141,7 +145,10 @@ class _Linearised:
 
             rng, probes = np.random.default_rng(1), 2
             y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
-            for _ in range(3):  # what the shift leaves, and rounding
+            x = preimage(np.column_stack([misfit, y]))
+            step = np.ascontiguousarray(x[:, 0]).view(np.complex128)
+            y = y - self.jacobian @ x[:, 1:]
+            for _ in range(2):  # what the shift leaves, and rounding
                 y = y - self.jacobian @ preimage(y)
             y = self._without_slope(y)
             checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
@@ -152,7 +159,7 @@ class _Linearised:
                 x = x + change
                 if np.abs(change).max() <= ROUNDED * np.abs(x).max():
                     break
-            return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
+            return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T, step
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
         """Columns (e, 2) less their components along the columns of log c."""
