@@ -54,7 +54,7 @@ from unassemble.boundaries.rim import Rim  # noqa: E402
 from unassemble.linalg import UpperTriangle, factorisation  # noqa: E402
 from unassemble.matrix import check_matrix  # noqa: E402
 from unassemble.planar.cotangent import edge_weights  # noqa: E402
-from unassemble.topology import Piece, local_numbering, surfaces  # noqa: E402
+from unassemble.topology import Piece  # noqa: E402
 
 CONDITIONS = {
     "eliminated": eliminated,
@@ -159,7 +159,7 @@ def bound(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:
     given = with_boundary_edges(with_diagonals(check_matrix(matrix)))
     gone = given.incomplete_rows if given.replaced is None else given.replaced
     known = 0
-    for piece in surfaces(given.n, given.edges, local_numbering(given.n, given.edges)).pieces:
+    for piece in given.surfaces.pieces:
         outside = gone[piece.vertices][piece.edges].all(axis=1)
         whole = ~outside if given.replaced is not None else piece.inner | (gone.any() & ~outside)
         rim = Rim(piece, whole, np.ones(len(piece.triangles), dtype=bool))

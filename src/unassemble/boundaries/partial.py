@@ -23,7 +23,7 @@ from ..scalar.joined import JoinedMesh
 from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
-from ..topology import Piece, Topology, local_numbering, surfaces
+from ..topology import Piece, Topology
 from .inside import InsideMesh, PieceEntries, fit_inside
 from .judge import node_status, partly, unknowns
 
@@ -52,7 +52,7 @@ def recover_partial(
     if options.method != "conformal" or options.noise is not None:
         return None
     with clock("topology"):
-        topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
+        topology = matrix.surfaces
     if not topology.pieces:
         return None
     scale = None if options.scale is None else options.scale * placement.stretch

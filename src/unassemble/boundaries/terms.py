@@ -21,7 +21,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED, ROUNDED
-from ..topology import Piece, local_numbering, surfaces
+from ..topology import Piece
 
 
 def recover_without_boundary_terms(
@@ -68,7 +68,7 @@ class _Loops:
         incomplete = matrix.incomplete_rows
         if not incomplete.any():
             return None
-        topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
+        topology = matrix.surfaces
         if len(topology.pieces) != 1 or topology.pieces[0].n_vertices < matrix.n:
             return None
         (piece,) = topology.pieces

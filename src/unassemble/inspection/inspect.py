@@ -10,7 +10,7 @@ from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
 from ..progress import quiet_libraries
 from ..tolerances import MOST
-from ..topology import Topology, components, located, require_planar, surfaces
+from ..topology import Topology, components, located, require_planar
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .inspection import Inspection
 
@@ -68,7 +68,7 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
         return of(shown)
     if (vector := vector_valued(matrix)) is not None:
         return of_nodes(vector)
-    read, topology = matrix, surfaces(matrix.n, matrix.edges)
+    read, topology = matrix, matrix.surfaces
     if not topology.pieces and (curved := surface_facts(matrix)):
         return of(curved)
     if _left_over(matrix, topology):

@@ -26,7 +26,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, SUMMED
-from ..topology import Topology, surfaces
+from ..topology import Topology
 from .cells import guessed_from_sums
 from .held import Held, Plain
 from .settled import in_one_size, less_mass, settled
@@ -45,7 +45,7 @@ def recover_with_terms(
     if not held.has_sums.any():
         return plain(matrix)
     with clock("topology"):
-        topology = surfaces(matrix.n, matrix.edges)
+        topology = matrix.surfaces
     # Else sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
     triangles = topology.pieces and not len(topology.bare_edges) and topology.multiplicity.all()
     if triangles:

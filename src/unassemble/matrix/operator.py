@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..tolerances import ROUNDED, SUMMED
+from ..topology import Topology, local_numbering, surfaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,11 @@ class OperatorMatrix:
     def adds_up(self) -> NDArray[np.bool_]:
         """(n,) rows that add up to zero, as those of a Laplacian do."""
         return np.asarray(np.abs(self.row_sums) <= SUMMED * (np.abs(self.diagonal) + self.couplings))
+
+    @cached_property
+    def surfaces(self) -> Topology:
+        """The surfaces that the 3-cycles of its graph make, as far as they do; vertices in breadth-first order."""
+        return surfaces(self.n, self.edges, local_numbering(self.n, self.edges))
 
     @property
     def alike(self) -> bool:

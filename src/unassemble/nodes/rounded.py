@@ -17,8 +17,8 @@ from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.stats
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from ..budget import REDRAWN
 from ..errors import GeometryError
@@ -191,5 +191,5 @@ def _explained(misfits: NDArray[np.float64], changes: NDArray[np.float64]) -> bo
         return False
     alike = (np.square(products).sum() - np.square(products.diagonal()).sum()) / (draws * (draws - 1))
     freedom = max(1.0, size**2 / alike)
-    bound = scipy.stats.f.isf(CONFIDENCE, freedom, draws * freedom)
+    bound = fdtri(freedom, draws * freedom, 1 - CONFIDENCE)
     return bool(misfits @ misfits <= size * max(NOISY**2, bound))

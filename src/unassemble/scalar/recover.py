@@ -15,7 +15,7 @@ from ..options import ScalarOptions
 from ..planar.deviations import coordinate_covariances
 from ..recovery import PlanarMesh
 from ..tolerances import SIGMAS
-from ..topology import Polygons, local_numbering, surfaces
+from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
 from .held import Held
@@ -52,7 +52,7 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     """The mesh of a matrix whose entries have errors of known size, or those of assembly."""
     free_scale = task.scale is None
     with clock("topology"):
-        topology = surfaces(stored.n, stored.edges, local_numbering(stored.n, stored.edges))
+        topology = stored.surfaces
     if task.noise is not None:
         stored = replace(stored, errors=task.noise.sigma * task.noise.spread)
     solved = solve(topology, stored, clock, task)
