@@ -38,6 +38,7 @@ class MeshFormat:
     cannot: str = ""  # why the format can hold no mesh of ours
 
 
+_NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
 _SVG_OPTIONS = {"float_fmt": ".12g", "image_width": None}
 
 FORMATS: Mapping[str, MeshFormat] = {
@@ -52,6 +53,7 @@ FORMATS: Mapping[str, MeshFormat] = {
     **dict.fromkeys((".dat", ".tec"), MeshFormat("tecplot", dimension=2, cells=_CELLS)),
     # meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
     **dict.fromkeys((".dato", ".post"), MeshFormat("permas", cells=_ALL | _LINES, data="none")),
+    **{f"{one}.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(one)) for one in (".dato", ".post")},
     **dict.fromkeys(
         (".e", ".ex2", ".exo"),
         MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4"),
