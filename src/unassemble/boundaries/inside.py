@@ -202,10 +202,6 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         near = np.zeros(piece.n_vertices, dtype=bool)
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
-        if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
-            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
-            if fit.misfit <= EXACT:
-                return fit, grown
     for _ in range(4):
         fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
         if fit.misfit <= EXACT:
