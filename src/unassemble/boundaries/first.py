@@ -18,7 +18,7 @@ from .rim import Rim
 
 # Weights of the prior, one after the other, and once more.
 _FADING = (0.1, 0.01, 1e-3, 0.0)
-_LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
+LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
 SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
@@ -63,7 +63,7 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
     first, second, third = ((mu, 3) for mu in _FADING[:-1])
-    large = problem.piece.n_vertices >= _LARGE
+    large = problem.piece.n_vertices >= LARGE
     for turn in ([first, second], [third]) if large else ([first], [second], [third]):
         z = fit_near(problem, fit.z, fit.scale, rim.whole, band, turn)
         fit = problem.fit(z, fit.scale, rim.whole, turn[-1][0], newton)
