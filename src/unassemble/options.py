@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from .errors import GeometryError, InputError
 from .reductions import ConstantTensor
-from .tolerances import SUMMED
 
 Direction = tuple[int, int, float]
 
@@ -68,12 +67,7 @@ class FrameOptions:
             object.__setattr__(self, "tensor", ConstantTensor(*map(float, self.tensor)))
         except (TypeError, ValueError) as error:
             raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {self.tensor!r}") from error
-        places = np.array([place[:2] for _, *place in self.anchors])
-        spanned = len(places) > 2
-        if spanned:
-            places /= np.abs(places).max()  # so that nothing overflows
-            spanned = np.linalg.matrix_rank(places - places[0], tol=SUMMED * np.ptp(places)) == 2
-        if not (spanned or (line and self.handed)):
+        if not (len(self.anchors) > 2 or (line and self.handed)):
             raise InputError(
                 "`tensor` can be undone only with a known orientation: give three `anchors` that are not in line, or "
                 "`direction` and `handed`"

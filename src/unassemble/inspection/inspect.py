@@ -5,12 +5,12 @@ from typing import Any
 
 from ..cells import guessed
 from ..diagnosis import Diagnosis, diagnosed, further_terms, indefinite, mass_matrix
-from ..errors import NotPlanarError, RecoveryError
+from ..errors import NotPlanarError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
 from ..progress import quiet_libraries
 from ..tolerances import MOST
-from ..topology import Topology, components, located, require_planar
+from ..topology import Topology, components, require_planar
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .inspection import Inspection
 
@@ -79,17 +79,14 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
     return of(found, planar=True)
 
 
-def _not_planar(matrix: OperatorMatrix) -> RecoveryError | None:
-    """Why the largest component of the graph is not planar; None where some component is."""
-    parts, errors = components(matrix.n, matrix.edges), []
-    for part in parts:
-        try:
-            require_planar(len(part.vertices), part.edges)
-        except NotPlanarError as error:
-            errors.append(located(error, part, named=len(parts) > 1))
-        else:
-            return None
-    return errors[0]
+def _not_planar(matrix: OperatorMatrix) -> NotPlanarError | None:
+    """Why the largest component of the graph is not planar; None where it is."""
+    part = components(matrix.n, matrix.edges)[0]
+    try:
+        require_planar(len(part.vertices), part.edges)
+    except NotPlanarError as error:
+        return error
+    return None
 
 
 def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:

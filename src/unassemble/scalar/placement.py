@@ -175,7 +175,7 @@ class Placement:
             if self.handed:
                 notes.append("three or more anchors fix the mirror image; `handed` was not used")
         else:
-            both = "two anchors leave the mirror image open: give a third, not in line, or `handed`"
+            both = "anchors in line leave the mirror image open: give one that is not, or `handed`"
             frame = self._of_two([fit[0] for fit in fits], piece, z, rows[:2], both)
             if not self.handed:
                 notes.append("the anchors leave two mirror images; the choice between them is by convention")
