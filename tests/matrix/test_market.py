@@ -162,8 +162,8 @@ def test_more_than_one_block(refused) -> None:
         (header("coordinate", "real", "symmetric") + "3 3 3\n2 1 1\n3 2 5\n2 3 5\n", ("row 2, column 3", "general")),
         ("%%MatrixMarket matrix coordinate real\n1 1 1\n1 1 3\n", "first line"),
         ("%%MatrixMarket vector coordinate real general\n3 1\n1 1.5\n", "vector"),
-        ("%%MatrixMarket matrix coordinate quaternion general\n1 1 1\n1 1 3\n", "'quaternion'"),
-        ("%%MatrixMarket matrix coordinate real lopsided\n1 1 1\n1 1 3\n", "'lopsided'"),
+        ("%%MatrixMarket matrix coordinate quaternion general\n1 1 1\n1 1 3\n", "quaternion"),
+        ("%%MatrixMarket matrix coordinate real lopsided\n1 1 1\n1 1 3\n", "lopsided"),
         ("%%MatrixMarket", "first line"),
     ],
 )

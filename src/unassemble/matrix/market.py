@@ -77,15 +77,13 @@ def read_market(stream: BinaryIO, name: str) -> sp.coo_array:
 def _read_header(text: io.TextIOWrapper, name: str) -> _Header:
     banner = text.readline()
     words = banner.lower().split()[1:]
-    if len(words) != 4 or words[0] != "matrix" or words[1] not in ("coordinate", "array"):
+    known = (("matrix",), ("coordinate", "array"), _FIELDS, _SYMMETRIES)
+    if len(words) != 4 or not all(word in some for word, some in zip(words, known, strict=True)):
         raise MatrixFileError(
             f"{name} begins with {_clip(banner)}, but the first line of a Matrix Market file reads "
             "'%%MatrixMarket matrix coordinate real symmetric' or alike"
         )
     _, layout, field, symmetry = words
-    for word, known in ((field, _FIELDS), (symmetry, _SYMMETRIES)):
-        if word not in known:
-            raise MatrixFileError(f"{name} announces {word!r} in its first line, which is none of {', '.join(known)}")
     if field == "pattern":
         raise MatrixError(
             f"{name} holds a pattern only and no numbers (its first line says so): the shape of the mesh is in "

@@ -51,8 +51,8 @@ def foreign(head: bytes, suffix: str = "") -> str:
 
     Meshes are told by their names, where `suffix` is that of a mesh format; else it is empty.
     """
-    if not head:
-        return "is empty"
+    if not head.strip():
+        return "is empty, or holds nothing but blanks"
     for offset, magic, sentence in _FOREIGN:
         if head[offset:].startswith(magic):
             return sentence
@@ -61,8 +61,6 @@ def foreign(head: bytes, suffix: str = "") -> str:
     if b"\0" in head:
         return "is a binary file of unknown format, not Matrix Market, .npz, .npy or .mat (version 5 or later)"
     text = head.removeprefix(_UTF8_MARK).lstrip()
-    if not text:
-        return "holds nothing but blanks"
     if text[:5].lower() in (b"<!doc", b"<html", b"<?xml"):
         return "is a web page or XML, not a matrix: the download may have failed"
     first = text.splitlines()[0][:40].decode("ascii", "backslashreplace")
