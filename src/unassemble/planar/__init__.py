@@ -8,10 +8,9 @@ from .hinges import join
 from .normal import WeightJacobian
 from .pencil import ConformalPencil, ShiftedSearch
 from .piece import PieceMesh, collapsed, refined
-from .polish import CAREFUL, PolishOptions, count_flipped, polish
+from .polish import PolishOptions, polish
 
 __all__ = [
-    "CAREFUL",
     "ConformalOptions",
     "ConformalPencil",
     "PieceMesh",
@@ -22,7 +21,6 @@ __all__ = [
     "collapsed",
     "collinear",
     "conformal_map",
-    "count_flipped",
     "covariances",
     "edge_weights",
     "estimate_scale",
