@@ -1,6 +1,6 @@
 """The certificate of a structure's coordinates: its rigid rotations cost nothing, and its members' blocks are theirs.
 
-Nothing is shared with the solver: members between the points, as they are written, are set up by the textbook.
+Positions come from other formulas. Here members between the points, as they are written, are set up by the textbook.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..nodes.nodal import determined
 from .layouts import Layout
 from .nodes import Nodes
 from .recognise import StructuralNumbering
-from .straight import Straight
+from .straight import Straight, misfits
 
 
 def forces(
@@ -47,40 +47,5 @@ def members_misfits(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Ends (k, 2) of straight members, and how far each block is from that of one between the points, part by part."""
     some = determined(points)[members.ends].all(axis=1)
-    ends, given = members.ends[some], members.blocks[some]
-    if not len(ends):
-        return ends, np.empty(0)
-    moves = len(layout.displacements)
-    place = np.array([*layout.displacements, *(3 + k for k in layout.rotations)])
-    again = _member_blocks(given, points[ends[:, 1]] - points[ends[:, 0]], place)
-    parts = (slice(moves), slice(moves, None))
-    size = [np.abs(given[:, a, b]).max(axis=(1, 2)) for a in parts for b in parts]
-    off = [np.abs(again[:, a, b] - given[:, a, b]).max(axis=(1, 2)) for a in parts for b in parts]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        misfit = np.divide(off, size).max(axis=0)
-    return ends, np.where(np.isnan(misfit), np.inf, misfit)
-
-
-def _member_blocks(given: NDArray[np.float64], vectors: NDArray[np.float64], place: NDArray[np.int64]) -> NDArray:
-    """(m, b, b) blocks of members along vectors (m, d), which stretch, bend and twist like the given ones.
-
-    Deflections that meet the stiffness S = 12 E I / l^3 give -S between deflections, S l / 2 and -S l / 2 between
-    deflections and slopes, and S l^2 / 6 between slopes, which are the rotations times the axis (Przemieniecki, Theory
-    of Matrix Structural Analysis, 1968, section 5.6). `place` holds the unknowns among three of either kind.
-    """
-    block = np.zeros((len(given), 6, 6))
-    block[:, place[:, None], place] = given
-    length = np.linalg.norm(vectors, axis=1)[:, None, None]
-    axis = np.zeros((len(given), 3, 1))
-    axis[:, : vectors.shape[1], 0] = vectors
-    axis = axis / np.where(length > 0, length, 1)
-    along = axis @ axis.transpose(0, 2, 1)
-    across = np.eye(3) - along
-    bending = -across @ (block + block.transpose(0, 2, 1))[:, :3, :3] @ across / 2
-    slopes = np.cross(np.eye(3), axis.transpose(0, 2, 1)).transpose(0, 2, 1)
-    bent = bending @ slopes * length / 2
-    again = np.zeros_like(block)
-    again[:, :3, :3] = along @ block[:, :3, :3] @ along - bending
-    again[:, :3, 3:], again[:, 3:, :3] = bent, -bent.transpose(0, 2, 1)
-    again[:, 3:, 3:] = along @ block[:, 3:, 3:] @ along + slopes.transpose(0, 2, 1) @ bent * length / 3
-    return again[:, place[:, None], place]
+    ends = members.ends[some]
+    return ends, misfits(members.blocks[some], points[ends[:, 1]] - points[ends[:, 0]], layout)
