@@ -64,17 +64,17 @@ class Model:
             added(total, pairs.place[batch][there], part[there])
         return total.reshape(entries.value.shape)
 
-    def operator(self, pairs: Pairs, entries: Entries, ratio: float | None = None) -> sp.csr_array:
-        """(e d d, 2 m) what coefficients add to the entries, relative to their size; (e d d, m) with lambda / mu."""
-        dd, unknowns = self.kind.dim**2, 2 if ratio is None else 1
+    def operator(self, pairs: Pairs, entries: Entries) -> sp.csr_array:
+        """(e d d, 2 m) what coefficients add to the entries, relative to their size."""
+        dd = self.kind.dim**2
         rows, columns, values = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0)]
         for batch, unit in self.contributions(pairs, entries):
             there = pairs.there[batch]
             place = pairs.place[batch][there]
             cell = np.arange(len(self.cells))[batch][np.nonzero(there)[0]]
-            for number, part in enumerate(unit if ratio is None else [ratio * unit[0] + unit[1]]):
+            for number, part in enumerate(unit):
                 rows.append((place[:, None] * dd + np.arange(dd)).ravel())
-                columns.append(np.repeat(unknowns * cell + number, dd))
+                columns.append(np.repeat(2 * cell + number, dd))
                 values.append((part[there] / entries.size[place][:, None, None]).ravel())
-        shape = (entries.value.size, unknowns * len(self.cells))
+        shape = (entries.value.size, 2 * len(self.cells))
         return sp.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
