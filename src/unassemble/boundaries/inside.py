@@ -153,10 +153,10 @@ def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: floa
     return fit, rim
 
 
-def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
+def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Rim | None:
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
-    return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)), keep)
+    return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)))
 
 
 def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
@@ -187,9 +187,8 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
     grown = Rim(piece, rim.given, keep | ~folded[piece.triangles].any(axis=1))
     free = movable
     for _ in range(24):
-        if not free.any():
-            break
-        z = fit_near(problem, z, core.scale, grown.whole, free, ((1e-5, 5), (0.0, 20)))
+        if free.any():
+            z = fit_near(problem, z, core.scale, grown.whole, free, ((1e-5, 5), (0.0, 20)))
         misfit = np.abs(problem.misfits(z, core.scale))
         relative = misfit / weight_roundings(piece, z)
         bad = grown.whole & ~(relative <= 1e-12)
@@ -202,19 +201,8 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         near = np.zeros(piece.n_vertices, dtype=bool)
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
-        if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
-            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
-            if fit.misfit <= EXACT:
-                return fit, grown
-    for _ in range(4):
-        fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
-        if fit.misfit <= EXACT:
-            return fit, grown
-        less = _less(problem, grown, fit, 0.25, keep=keep)
-        if less is None:
-            break
-        grown = less
-    return core, rim
+    fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+    return (fit, grown) if fit.misfit <= EXACT else (core, rim)
 
 
 def _grown_by_sets(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
