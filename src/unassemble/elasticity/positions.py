@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from ..nodes.nodal import NodalMatrix, determined, eliminated, surrounded, valid_pairs
 from .nullspace.placing import Solution, placed
-from .straight.straight import straightened
+from .straight import straightened
 
 # Nodes of a body in space beyond which planes are asked at once where there are rollers: without them rows next to
 # rollers leave hundreds of fields free, all of which charts would look for.

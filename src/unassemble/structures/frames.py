@@ -14,10 +14,9 @@ from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
-from .certificate import forces, members_misfits
+from .certificate import forces, members_misfits, mispaired
 from .contradicted import said_of
 from .members import members_and_cells
-from .mispaired import mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed
 from .recognise import StructuralNumbering

@@ -25,9 +25,8 @@ from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
 from ..words import Reason, count_of
 from .answer import answer, covered
-from .connected import Piece
 from .least_squares import up_to_size
-from .placed import Placed, placed, without_free
+from .placed import Piece, Placed, placed, without_free
 
 
 class Bars(NamedTuple):

@@ -15,8 +15,7 @@ from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
 from ...linalg import threads
 from ...tolerances import CERTIFIED, LITTLE, ROUNDED, SINGULAR
-from .entries import Entries, Pairs
-from .model import Model, added, claims
+from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
 _LARGEST = 50_000_000  # numbers in a least-squares problem
