@@ -169,9 +169,7 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
         raise InputError(f"node and direction are needed for each of the {order} rows")
     d = int(direction.max()) + 1
     if d not in (2, 3) or direction.min() < 0:
-        raise InputError(
-            "directions are numbered from 0: solids have 2 or 3, straight beams 4, frames and shells 3 or 6"
-        )
+        raise InputError("directions are numbered from 0: solids have 2 or 3, beams 4, frames and shells 3 or 6")
     node = by_first_row(node)
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")

@@ -1,7 +1,7 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,6 @@ from ..errors import GeometryError
 from ..nodes.nodal import determined
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
-from ..words import count_of
 
 
 class Piece(NamedTuple):
@@ -89,25 +88,14 @@ class Placed:
 
 
 def without_free(found: Placed, most: int) -> Placed:
-    """Positions of pieces whose null space has no larger dimension: others mean nothing. GeometryError for none."""
-    free = np.array([one.null_dimension > most for one in found.evidence])
-    if not free.any():
-        return found
-    said = f"the null space has dimension {found.null_dimension} where {most} is expected"
-    if free.all():
+    """The same; GeometryError where the null space of a piece has a larger dimension: positions mean nothing."""
+    if found.null_dimension > most:
         raise GeometryError(
-            f"no positions were found: {said}. Supports leave too few whole rows, or unknowns of nodes are along axes "
-            "of their own, as in cylindrical coordinates"
+            f"no positions were found: the null space has dimension {found.null_dimension} where {most} is expected. "
+            "Supports leave too few whole rows, or unknowns of nodes are along axes of their own, as in cylindrical "
+            "coordinates"
         )
-    place = np.append(np.where(free, -1, np.cumsum(~free) - 1), -1)
-    component = place[found.component]
-    return replace(
-        found,
-        points=np.where(component[:, None] < 0, np.nan, found.points),
-        component=component,
-        evidence=tuple(one for one in found.evidence if one.null_dimension <= most),
-        notes=(*found.notes, f"{said} in {count_of(int(free.sum()), 'piece')}, which were left out"),
-    )
+    return found
 
 
 def placed(
