@@ -66,8 +66,7 @@ class ScalarReadings:
             return None
 
         def with_terms() -> PlanarMesh | None:
-            anchored = bool(self.placement.anchors)
-            found = recover_elements_with_terms(self.matrix, of_cells, self.clock, anchored=anchored)
+            found = recover_elements_with_terms(self.matrix, of_cells, self.clock)
             return None if found is None or found.status == "uncertified" else found
 
         terms = not self.placement.tensor

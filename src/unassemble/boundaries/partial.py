@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from operator import itemgetter
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,6 @@ from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import edge_weights
-from ..planar.deviations import covariances
-from ..planar.normal import WeightJacobian, distant_pair
 from ..planar.piece import positions
 from ..recovery import PlanarMesh
 from ..scalar.joined import JoinedMesh
@@ -71,16 +68,7 @@ def recover_partial(
         return None
     with clock("place"):
         placed = _Placed.of(topology, meshes, placement)
-    with clock("certify"):
-        judged = _Judged.of(matrix, placed, placement, known_scale=scale is not None)
-    found = _report(matrix, placed, judged, placement, clock)
-    if found is None or not options.standard_deviations:
-        return found
-    if placed.region is not None:
-        said = "standard deviations are not computed where the coefficient has several values"
-        return replace(found, warnings=(*found.warnings, said))
-    with clock("deviations"):
-        return replace(found, standard_deviations=placed.deviations(matrix, placement, known_scale=scale is not None))
+    return _report(matrix, placed, placement, clock, options)
 
 
 def distinct(scale: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -149,72 +137,38 @@ class _Placed:
         status = node_status(joined.component, parts)
         return cls(topology, [mesh for _, mesh in found], positions, joined, factor, region, status, [*said, *notes])
 
-    def deviations(self, matrix: OperatorMatrix, placement: Placement, *, known_scale: bool) -> NDArray[np.float64]:
-        """(n, 2) standard deviations, by what entries leave of each other; in several pieces those of the first."""
-        result = np.full((matrix.n, 2), np.nan)
-        tensor = placement.tensor
-        for piece, mesh, z in reversed(list(zip(self.topology.pieces, self.meshes, self.positions, strict=True))):
-            drawn, stretch = (tensor.to_laplacian(z), tensor.root) if tensor else (z, None)
-            known, used = mesh.determined, mesh.entries
-            result[piece.vertices] = np.nan
-            spare = int(used.sum()) - unknowns(known, 0 if known_scale else 1)
-            if spare <= 0:
-                continue
-            own = edge_weights(piece, mesh.z)
-            misfit = -matrix.entries[piece.edge_rows] / mesh.scale[0] - own
-            sigma = float(np.linalg.norm(misfit[used])) / np.sqrt(spare)
-            jacobian = WeightJacobian(piece, drawn, np.where(used, 1.0, np.inf))
-            pins = np.append(np.flatnonzero(~known), np.flatnonzero(known)[distant_pair(drawn[known])])
-            covariance = covariances(
-                jacobian, np.where(used, own, 0.0), drawn[known], pins,
-                free_scale=not known_scale, stretch=stretch, nodes=itemgetter(known),
-            )  # fmt: skip
-            result[piece.vertices[known]] = sigma * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        return result
 
+def _report(
+    matrix: OperatorMatrix, placed: _Placed, placement: Placement, clock: Clock, options: ScalarOptions
+) -> PlanarMesh | None:
+    """The mesh, if whole entries between determined vertices, fitted or not, are those of it as it is written.
 
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    """Whole entries between determined vertices, held against the mesh as it is written."""
-
-    backward_error: float  # as in :class:`..recovery.Recovery`, of these entries
-    entries: int  # their number
-    spare: int  # what is left of it, in the piece where least is, beyond unknowns
-    wrong: bool  # whether the matrix has the mesh's diagonal: then entries that do not fit are wrong ones
-
-    @classmethod
-    def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:
-        """Assembled again from points and triangles."""
-        mesh = placed.mesh
+    None, too, where the matrix has the mesh's diagonal: then entries that do not fit are wrong ones.
+    """
+    mesh, topology, status = placed.mesh, placed.topology, placed.status
+    with clock("certify"):
         points = np.nan_to_num(mesh.points)
         found = certify(matrix.edges, matrix.entries, points, mesh.triangles, placed.factor, placement.coefficients)
         rows, spare = [], []
-        for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
+        for piece, inside in zip(topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
-                among = inside.given & inside.determined[piece.stencil].all(axis=0)  # fitted or not
-                rows.append(piece.edge_rows[among])
-                factors = 0 if known_scale else len(inside.scale)
+                rows.append(piece.edge_rows[inside.given & inside.determined[piece.stencil].all(axis=0)])
+                factors = 0 if options.scale is not None else len(inside.scale)
                 spare.append(int(inside.entries.sum()) - unknowns(inside.determined, factors))
         pairs = matrix.edges[np.concatenate(rows)]
-        key = found.pairs @ [matrix.n, 1]
-        misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
-        flipped = (placed.status[mesh.triangles[found.flipped]] == 0).all(axis=1).any()
+        error = float(
+            found.misfits[np.searchsorted(found.pairs @ [matrix.n, 1], pairs @ [matrix.n, 1])].max(initial=0.0)
+        )
+        flipped = (status[mesh.triangles[found.flipped]] == 0).all(axis=1).any()
         sums = matrix.row_sums.copy()
         for end in found.pairs.T:
             sums += np.bincount(end, found.differences, matrix.n)
-        gone = (np.abs(sums) > CERTIFIED * matrix.row_size) | (placed.status > 0)
-        error = np.inf if flipped else float(misfit.max(initial=0.0))
-        return cls(error, len(pairs), min(spare), len(pairs) < len(matrix.edges) and not gone.any())
-
-
-def _report(
-    matrix: OperatorMatrix, placed: _Placed, judged: _Judged, placement: Placement, clock: Clock
-) -> PlanarMesh | None:
-    if not (judged.backward_error <= CERTIFIED and judged.spare > 0) or judged.wrong:
+        gone = (np.abs(sums) > CERTIFIED * matrix.row_size) | (status > 0)
+    wrong = len(pairs) < len(matrix.edges) and not gone.any()
+    if flipped or wrong or not (error <= CERTIFIED and min(spare) > 0):
         return None
-    mesh, topology = placed.mesh, placed.topology
     told = "" if placed.region is None else f", with a factor for each of {len(mesh.scale)} regions,"
-    fields, loose = partly(placed.status, judged.entries, judged.backward_error, told)
+    fields, loose = partly(status, len(pairs), error, told, bars=options.standard_deviations)
     return PlanarMesh(
         **mesh.fields(triangulate=placed.region is not None),
         points=mesh.points,

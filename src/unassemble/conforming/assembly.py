@@ -31,7 +31,7 @@ _CELLS = AT_ONCE // 1024  # few enough for the cache: a cell has about a hundred
 class Entries:
     """Weights w = -K of all pairs of a part, for positions of its nodes, or of its corners where it is straight.
 
-    A :class:`~unassemble.planar.problem.Model`.
+    A :class:`~unassemble.planar.polish.Model`.
 
     `straight`: whether positions are those of corners, from which all nodes follow.
     """
@@ -145,15 +145,11 @@ class EntriesJacobian:
     """dw / d(x, y); a :class:`~unassemble.planar.normal.Jacobian`."""
 
     def __init__(self, blocks: list[_Block], z: NDArray, n: int, spread: NDArray):
-        self._blocks, self._z, self.n, self.spread = blocks, z, n, spread
-
-    @property
-    def matrix(self) -> sp.bsr_array:
-        """(e, 2 n) in blocks of x and y."""
-        total = sp.csr_array((len(self.spread), self.n), dtype=np.complex128)
-        for block in self._blocks:
+        self.n, self.spread = n, spread
+        total = sp.csr_array((len(spread), n), dtype=np.complex128)
+        for block in blocks:
             rows, columns, values = [], [], []
-            for some, at in block.parts(self._z):
+            for some, at in block.parts(z):
                 squares, (along_p, along_r) = at.squares(), at.gradient()
                 value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
                 for k in range(value.shape[2]):
@@ -163,42 +159,19 @@ class EntriesJacobian:
                 row = np.broadcast_to(block.places[some][:, :, None], value.shape)
                 rows.append(row.astype(np.int32).ravel())
                 columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
-                values.append((value / self.spread[row]).ravel())
+                values.append((value / spread[row]).ravel())
             place = np.concatenate(rows), np.concatenate(columns)
             total = total + sp.coo_array((np.concatenate(values), place), shape=total.shape).tocsr()
-        blocks = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]
-        return sp.bsr_array((blocks, total.indices, total.indptr), shape=(total.shape[0], 2 * self.n))
+        data = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]
+        self.matrix = sp.bsr_array((data, total.indices, total.indptr), shape=(len(spread), 2 * n))
 
     def forward(self, displacement: NDArray) -> NDArray:
         """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
-        if displacement.ndim > 1:
-            return np.column_stack([self.forward(np.ascontiguousarray(one)) for one in displacement.T])
-        changes = []
-        for block in self._blocks:
-            own: list[NDArray] = []
-            for some, at in block.parts(self._z):
-                moves, (along_p, along_r) = displacement[block.moved[some]], at.gradient()
-                stretch = along_p * _matmul(moves, block.slopes[0].T) + along_r * _matmul(moves, block.slopes[1].T)
-                own.append(block.products(*(_real(stretch, one) for one in at.squares())))
-            changes.append((block, own))
-        return _total(len(self.spread), changes) / self.spread
+        return np.asarray(self.matrix @ np.ascontiguousarray(displacement.T).view(np.float64).T)
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
-        result = np.zeros(self.n, dtype=np.complex128)
-        change = change / self.spread
-        for block in self._blocks:
-            forces: list[NDArray] = []
-            for some, at in block.parts(self._z):
-                own = change[block.places[some]]
-                pull = sum(one * (own @ pairs.T) for one, pairs in zip(at.squares(), block.pairs, strict=True))
-                along_p, along_r = at.gradient()
-                force = _matmul(np.conj(along_p) * pull, block.slopes[0])
-                forces.append(force + _matmul(np.conj(along_r) * pull, block.slopes[1]))
-            force, moved = np.concatenate(forces).ravel(), block.moved.ravel()
-            result.real += np.bincount(moved, force.real, self.n)
-            result.imag += np.bincount(moved, force.imag, self.n)
-        return result
+        return np.asarray(self.matrix.T @ change).view(np.complex128)
 
 
 def _total(n: int, sums: Iterable[tuple[_Block, list[NDArray]]]) -> NDArray[np.float64]:

@@ -78,17 +78,15 @@ def fitted(
     trials = []  # with straight sides: the quadrature that fits best, of those that fit alike the first
     for trial in by_rule(part, weights, z, c, noise):
         trials.append(trial)
-        if trials[-1].size <= AGREED:
+        if trial.size <= AGREED:
             break
     least = min(trial.size for trial in trials)
     straight = next((trial for trial in trials if trial.size <= max(AGREED, _ALIKE * least)), trials[0])
     if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
         return _settled(straight, scale, noise) if refine else straight
-    straight, curved = _polished(straight, weights, scale, noise), None
+    straight, curved = _polished(straight, scale, noise), None
     for rule in _rules(part, straight=False):
-        trial = _polished(
-            _with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), weights, scale, noise
-        )
+        trial = _polished(_with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), scale, noise)
         if not trial.entries.flipped(trial.z) and (curved is None or trial.size < curved.size):
             curved = trial
         if curved is not None and curved.size < max(ROUNDED, _left_by(noise, c)):
@@ -101,16 +99,15 @@ def fitted(
 
 def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitted:
     """Polished, with the best of those rules that are too much alike to be told apart before."""
-    best = _polished(start, start.weights, scale, noise)
+    best = _polished(start, scale, noise)
     if best.size < LAST_DIGITS:
         return best
     for rule in _rules(best.part, straight=best.straight):
-        given = best.part, best.weights, best.z, best.scale
         if rule == best.rule:
             continue
-        other = _with_rule(*given, noise, rule, straight=best.straight)
+        other = _with_rule(best.part, best.weights, best.z, best.scale, noise, rule, straight=best.straight)
         if LITTLE * other.size < best.size and not np.array_equal(other.misfit, best.misfit):
-            other = _polished(other, start.weights, scale, noise)
+            other = _polished(other, scale, noise)
             best = other if other.size < _ALIKE / 2 * best.size else best
     return best
 
@@ -147,13 +144,13 @@ def _rules(part: Part, *, straight: bool) -> Iterator[dict[str, str]]:
         yield {name: next(islice(some, min(k, len(some) - 1), None)) for name, some in names.items()}
 
 
-def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArray | None) -> Fitted:
+def _polished(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitted:
     """Gauss-Newton; where it cannot be done the part stays as it is, with a note.
 
     Unless the noise is known, errors are taken to be those of assembly, or, where the misfit is beyond that and more
     likely to be such, of one size.
     """
-    entries = start.entries
+    entries, weights = start.entries, start.weights
     if entries.flipped(start.z) or not start.spread.min() > np.finfo(float).eps ** 2 * start.spread.max():
         return replace(start, notes=("no polish: cells are flat or turned over",))
     try:

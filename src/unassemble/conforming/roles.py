@@ -45,6 +45,7 @@ class _Sides:
     per_cell: NDArray[np.int64]
     corner: NDArray[np.bool_]
     middle: NDArray[np.bool_]
+    size: NDArray[np.float64]  # (n,) what corners have less of than other nodes
 
 
 def ordered_cells(
@@ -67,9 +68,25 @@ def ordered_cells(
     told, first = found.told, 0
     for sets in found.sets:
         kind = KINDS[_KINDS[sets.shape[1]]]
-        per_cell = sides.per_cell[first : first + len(sets)]
-        blocks[kind], by_graph = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
-        told = told and by_graph
+        trials = list(_trials(kind, sets, sides, sides.per_cell[first : first + len(sets)]))
+        order, count = np.zeros(sets.shape, np.int64), np.zeros(len(sets), np.int64)
+        for some, trial in trials:
+            order[some] = trial
+            count[some] += 1
+        if not count.all():
+            raise TopologyError(f"row {int(sets[np.argmin(count)][0])} is in a cell whose sides do not close")
+        several = np.flatnonzero(count > 1)
+        entries = ElementEntries(matrix, sets[several], every, mass=mass)
+        best = np.full(len(several), np.inf)
+        for some, trial in trials:
+            mine = count[some] > 1
+            some, trial = some[mine], trial[mine]
+            at = np.searchsorted(several, some)
+            misfit = entries.misfit(kind, at, trial)
+            better = misfit < best[at]
+            best[at[better]], order[some[better]] = misfit[better], trial[better]
+        blocks[kind] = np.take_along_axis(sets, order, axis=1)
+        told = told and not len(several)
         first += len(sets)
     return blocks, told
 
@@ -102,58 +119,19 @@ def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:
     if (np.diff(keys[order]) == 0).any():
         raise TopologyError("more than two cells share a side")
     per_cell = np.bincount(np.concatenate([one, other]), minlength=int(shift[-1]))
-    return _Sides(keys[order], side[order, 2:], per_cell, corner, middle)
-
-
-def _ordered(
-    matrix: OperatorMatrix,
-    kind: Kind,
-    sets: NDArray[np.int64],
-    sides: _Sides,
-    per_cell: NDArray[np.int64],
-    size: NDArray,
-    every: NDArray[np.int64],
-    *,
-    mass: bool,
-) -> tuple[NDArray[np.int64], bool]:
-    """Cells of one kind, and whether the graph alone tells them."""
-    corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
-    order = np.zeros(sets.shape, np.int64)
-    trials = list(_trials(matrix.n, kind, sets, sides, per_cell, (corners, inner, open_rows, n_open)))
-    count = np.zeros(len(sets), np.int64)
-    for some, trial in trials:
-        order[some] = trial
-        count[some] += 1
-    if not count.all():
-        raise TopologyError(f"row {int(sets[np.argmin(count)][0])} is in a cell whose sides do not close")
-    doubtful = np.flatnonzero(count > 1)
-    entries = ElementEntries(matrix, sets[doubtful], every, mass=mass)
-    best = np.full(len(doubtful), np.inf)
-    for some, trial in trials:
-        several = count[some] > 1
-        some, trial = some[several], trial[several]
-        at = np.searchsorted(doubtful, some)
-        misfit = entries.misfit(kind, at, trial)
-        better = misfit < best[at]
-        best[at[better]], order[some[better]] = misfit[better], trial[better]
-    return np.take_along_axis(sets, order, axis=1), not len(doubtful)
+    return _Sides(keys[order], side[order, 2:], per_cell, corner, middle, size)
 
 
 def _trials(
-    n: int,
-    kind: Kind,
-    sets: NDArray[np.int64],
-    sides: _Sides,
-    per_cell: NDArray[np.int64],
-    parted: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+    kind: Kind, sets: NDArray[np.int64], sides: _Sides, per_cell: NDArray[np.int64]
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Which cells, increasing, and places of their nodes in an order that the graph allows."""
-    corners, inner, open_rows, n_open = parted
+    corners, inner, open_rows, n_open = _parted(kind, sets, sides)
     for ring in _RINGS[kind.corners]:
         around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
         ends = np.take_along_axis(sets, around, axis=1)
         # Where the sides of the ring are among those of two cells.
-        place, known = found(sides.keys, pair_keys(n, ends, np.roll(ends, -1, axis=1)))
+        place, known = found(sides.keys, pair_keys(len(sides.size), ends, np.roll(ends, -1, axis=1)))
         fits = (known.sum(axis=1) == per_cell) & ((kind.degree - 1) * (~known).sum(axis=1) == n_open)
         pattern = known @ (1 << np.arange(kind.corners))
         for code in np.unique(pattern[fits]):
@@ -167,7 +145,7 @@ def _trials(
 
 
 def _parted(
-    kind: Kind, sets: NDArray[np.int64], sides: _Sides, size: NDArray
+    kind: Kind, sets: NDArray[np.int64], sides: _Sides
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Places in each set: of corners (m, c), of the node inside (m, 0 or 1), of rows on sides not known (m, most).
 
@@ -175,14 +153,14 @@ def _parted(
     """
     corner, middle = sides.corner[sets], sides.middle[sets]
     free = ~(corner | middle)
-    rank = np.where(corner, -1.0, np.where(middle, np.inf, size[sets]))
+    rank = np.where(corner, -1.0, np.where(middle, np.inf, sides.size[sets]))
     by_rank = np.argsort(rank, axis=1, kind="stable")
     corners = by_rank[:, : kind.corners]
     if np.take_along_axis(middle, corners, axis=1).any() or (corner.sum(axis=1) > kind.corners).any():
         raise TopologyError("rows that cells share do not form sides")
     np.put_along_axis(free, corners, False, axis=1)
     n_inner = kind.nodes - kind.corners * kind.degree
-    inner = np.argmax(np.where(free, size[sets], -1.0), axis=1)[:, None][:, :n_inner]
+    inner = np.argmax(np.where(free, sides.size[sets], -1.0), axis=1)[:, None][:, :n_inner]
     np.put_along_axis(free, inner, False, axis=1)
     open_rows = np.argsort(~free, axis=1, kind="stable")
     return corners, inner, open_rows, free.sum(axis=1)

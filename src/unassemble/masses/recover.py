@@ -29,7 +29,7 @@ from ..tolerances import ALIKE, SUMMED
 from ..topology import Topology
 from .cells import guessed_from_sums
 from .held import Held, Plain
-from .settled import in_one_size, less_mass, settled
+from .settled import less_mass, settled
 from .triangles import with_consistent_mass, with_lumped_mass
 
 
@@ -62,16 +62,11 @@ def recover_with_terms(
 
 
 def recover_elements_with_terms(
-    matrix: OperatorMatrix,
-    of_cells: Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh],
-    clock: Clock,
-    *,
-    anchored: bool,
+    matrix: OperatorMatrix, of_cells: Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh], clock: Clock
 ) -> PlanarMesh | None:
     """The mesh of c L + s M or S c L S, of other elements; None where row sums show neither, or nothing comes near.
 
-    `of_cells`: recovers a matrix c L + D on cells that its rows may form; `anchored`: whether positions are given, so
-    that no piece may change its size.
+    `of_cells`: recovers a matrix c L + D on cells that its rows may form.
     """
     held = Held(matrix)
     if not held.has_sums.any():
@@ -90,13 +85,10 @@ def recover_elements_with_terms(
         if np.ptp(np.sign(np.concatenate([some.sum(axis=1) for some in weights.values()]))):
             return None
 
-        def sized(left: OperatorMatrix) -> PlanarMesh:
-            found = of_cells(left, [cells])
-            return found if anchored else in_one_size(found, matrix.row_sums, cells.blocks)
+        def plain(left: OperatorMatrix) -> PlanarMesh:
+            return of_cells(left, [cells])
 
-        if told:
-            return settled(held, weights, cells.blocks, sized, patience=0, told=True)
-        return settled(held, weights, cells.blocks, sized)
+        return settled(held, weights, cells.blocks, plain, patience=0 if told else 9, told=bool(told))
     except RecoveryError:
         return None
 

@@ -19,7 +19,6 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
-from .beside import enlarged
 from .cells import Blocks, Weights, less, told_by_entries, weights_at
 from .held import Held
 
@@ -77,15 +76,3 @@ def settled(
     operator, terms = "c L + s M, M the consistent mass matrix,", Terms(held.matrix.diagonal, reaction)
     unproved = "" if told else "that no other mesh, with another mass, fits as well is not proved"
     return held.with_terms(found, terms, operator, unproved=unproved)
-
-
-def in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
-    """Pieces that share no vertex, each about its centroid in the size that its row sums give it beside the first."""
-    component, n = found.component, len(found.scale)
-    if n == 1 or len(found.hinges) or (component < 0).any():
-        return found
-    areas, count = weights_at(found.points, blocks), np.bincount(component)
-    each = sum(np.bincount(component[cells[:, 0]], areas[kind].sum(axis=1), n) for kind, cells in blocks.items())
-    ratio = np.bincount(component, sums, n) / each
-    centre = np.column_stack([np.bincount(component, x) / count for x in found.points.T])[component]
-    return enlarged(found, np.sqrt(ratio / ratio[0]), centre) if (ratio / ratio[0] > 0).all() else found

@@ -34,11 +34,10 @@ _NONE = "no edge lengths were found that have these entries: the triangles that 
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """Squared edge lengths of one edge-connected piece, and how they were found."""
+    """Squared edge lengths of one edge-connected piece."""
 
     squared: NDArray[np.float64]  # (e,) in the gauge of mean 1
     scale: float  # the factor c of the weights
-    history: tuple[float, ...]  # norm of the misfit of the weights, relative to theirs, before each step
 
 
 class Normal:
@@ -82,15 +81,14 @@ def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) ->
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused
             u, count = _central_path(unit, opposite, normal)
-            history: list[float] = []
             if polish:
-                u, history = _newton(unit, opposite, normal, u, _STEPS - count)
+                u = _newton(unit, opposite, normal, u, _STEPS - count)
     except SolverError as error:
         raise GeometryError(_NONE) from error
     finally:
         normal.release()
     _, cotangents = areas_cotangents(u[opposite])
-    return Metric(u / u.mean(), float((weights @ u) / (summed(opposite, cotangents / 2, len(u)) @ u)), tuple(history))
+    return Metric(u / u.mean(), float((weights @ u) / (summed(opposite, cotangents / 2, len(u)) @ u)))
 
 
 def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArray, int]:
@@ -124,28 +122,26 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArra
     raise GeometryError(_NONE)
 
 
-def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: int) -> tuple[NDArray, list[float]]:
+def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: int) -> NDArray:
     """Newton's method for w(u) = w / c, until the misfit no longer falls.
 
     The matrix has the null vector u, to which the misfit is orthogonal if c is chosen so: a shift next to rounding
     makes it definite.
     """
-    history: list[float] = []
-    best = u
+    best, least, before = u, np.inf, np.inf
     for _ in range(max(steps, 1)):
         sides = u[opposite]
         area, cotangents = areas_cotangents(sides)
         own = summed(opposite, cotangents / 2, len(u))
         misfit = own - w * ((own @ u) / (w @ u))
-        history.append(float(np.linalg.norm(misfit) / np.linalg.norm(own)))
-        if not np.isfinite(history[-1]):
+        left = float(np.linalg.norm(misfit) / np.linalg.norm(own))
+        if left <= least:
+            best, least = u, left
+        if not np.isfinite(left) or 0.1 * before < left < 1e-9:
             break
-        if history[-1] <= min(history):
-            best = u
-        if len(history) > 1 and history[-1] < 1e-9 and history[-1] > 0.1 * history[-2]:
-            break
+        before = left
         ones = np.ones(len(area))
         change = u * normal.factorised(2 * blocks_of(sides, area, cotangents, ones, -ones), 1e-10).solve(misfit * u)
         change -= u * ((own @ change) / (own @ u))
         u = u + min(1.0, 0.9 * longest_step(sides, change[opposite]).min()) * change
-    return best, history
+    return best

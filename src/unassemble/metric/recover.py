@@ -20,7 +20,7 @@ from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test
 from .program import Metric, solve_metric
 from .taken_out import with_vertices_back
-from .verdict import READINGS, SEVERAL, Found, Verdict, judged
+from .verdict import READINGS, Found, Verdict, judged
 
 
 def recover_surface(
@@ -86,8 +86,12 @@ def _recovered(
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
-        if verdict.status == "certified" and options.scale is None:
-            verdict = Verdict("ambiguous", "ambiguous", SEVERAL)
+        if verdict[0] == "certified" and options.scale is None:
+            reason = (
+                "with one vertex put back into each hole where rows lack entries, lengths give all entries and row "
+                "sums back, but so may several vertices in a hole"
+            )
+            verdict = "ambiguous", "ambiguous", reason
     return _report(best, verdict, notes, clock, deviations)
 
 
@@ -119,8 +123,8 @@ def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: Sc
 
 
 def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, deviations: NDArray | None) -> Surface:
-    mesh = found.mesh
-    worst, misfits = found.certificate.entries.worst(10 if verdict.uniqueness is None else 0)
+    mesh, (status, uniqueness, reason) = found.mesh, verdict
+    worst, misfits = found.certificate.entries.worst(10 if uniqueness is None else 0)
     curvature = mesh.curvature(found.squared)
     loop = mesh.loop_of_boundary
     return Surface(
@@ -132,9 +136,9 @@ def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, devi
         boundary=mesh.edges[mesh.boundary[np.argsort(loop, kind="stable")]],
         boundary_offsets=np.append(0, np.cumsum(np.bincount(loop))),
         node_status=(~np.isfinite(curvature)).astype(np.int8),
-        status=verdict.status,
-        uniqueness=verdict.uniqueness,
-        reason=verdict.reason,
+        status=status,
+        uniqueness=uniqueness,
+        reason=reason,
         operator="surface laplacian",
         backward_error=found.certificate.entries.backward_error,
         timings=clock.timings,

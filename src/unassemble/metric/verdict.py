@@ -18,10 +18,7 @@ from .noise import scale_deviation
 
 READINGS = 16  # as many choices of triangles as are tried one by one
 
-SEVERAL = (
-    "with one vertex put back into each hole where rows lack entries, lengths give all entries and row sums back, but "
-    "so may several vertices in a hole"
-)
+Verdict = tuple[str, str | None, str]  # status, uniqueness and reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +51,6 @@ class Found:
         return replace(self, mesh=left, squared=(length / mean[piece]) ** 2)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What is said of a surface."""
-
-    status: str
-    uniqueness: str | None
-    reason: str
-
-
 def judged(found: Found, fitting: int, readings: int, solid: NDArray, options: ScalarOptions, n_cycles: int) -> Verdict:
     """Certified is a surface whose matrix is the given one, diagonal or known scale included, and the only one.
 
@@ -72,55 +60,55 @@ def judged(found: Found, fitting: int, readings: int, solid: NDArray, options: S
     """
     held = found.certificate
     if found.failures:
-        return Verdict("uncertified", None, found.failures[0])
+        return "uncertified", None, found.failures[0]
     if len(held.entries.flipped):
         triangle = found.mesh.triangles[held.entries.flipped[0]]
-        return Verdict("uncertified", None, f"the sides of the triangle of rows {words_of(triangle)} do not meet")
+        return "uncertified", None, f"the sides of the triangle of rows {words_of(triangle)} do not meet"
     if not found.fits:
         i, j = held.entries.pairs[np.argmax(held.entries.misfits)]
         known = "" if options.scale is None else f" with c = {options.scale:g}"
         error = held.entries.backward_error
         reason = f"lengths{known} give the entries back up to {error:.1e} (relative) only, worst in rows {i} and {j}"
-        return Verdict("uncertified", None, reason)
+        return "uncertified", None, reason
     bare = np.bincount(found.mesh.piece_of_edge, ~solid) == 0
     if bare.any():
         row = int(found.mesh.triangles[found.mesh.piece == np.argmax(bare)].min())
         reason = f"in the piece of row {row} every edge belongs to four rows that are all coupled, as in a solid"
-        return Verdict("ambiguous", "ambiguous", f"{reason}: tetrahedra fit as well")
+        return "ambiguous", "ambiguous", f"{reason}: tetrahedra fit as well"
     if fitting > 1 or readings > READINGS:
-        return Verdict("ambiguous", "ambiguous", "other choices of triangles have lengths that fit as well")
+        return "ambiguous", "ambiguous", "other choices of triangles have lengths that fit as well"
     kept = "proved" if n_cycles == len(found.mesh.triangles) else "searched"
     fits = "the lengths give every entry back, and no others do on these triangles"
     if options.noise is not None:
         return _with_noise(found, kept, fits, options.noise, options.scale)
     if options.scale is not None:
-        return Verdict("certified", kept, sentences((fits, "the scale is the given one")))
+        return "certified", kept, sentences((fits, "the scale is the given one"))
     off = held.row_misfits > CERTIFIED
     inside = np.bincount(found.mesh.edges[found.mesh.boundary].ravel(), minlength=found.mesh.n) == 0
     if not off.any() and (held.diagonal == "zero" or inside.any()):
-        return Verdict("certified", kept, sentences((fits, _SUMS[held.diagonal])))
+        return "certified", kept, sentences((fits, _SUMS[held.diagonal]))
     row = int(np.argmax(off))
     reason = (
         f"{fits}, but there are as many unknowns as entries, and that this is a surface with all its rows does not "
         f"show: rows do not sum to zero, row {row} for one"
     )
-    return Verdict("uncertified", kept, sentences((reason, "a known scale would tell")))
+    return "uncertified", kept, sentences((reason, "a known scale would tell"))
 
 
 def _with_noise(found: Found, kept: str, fits: str, sigma: float, scale: float | None) -> Verdict:
     """Lengths fit noisy entries as well as exact ones: what is tested is the row sums, or the scale."""
     if sigma > LARGEST_NOISE * np.abs(found.scale).min():
-        return Verdict("uncertified", None, "the noise is too large: angles are known to no more than a few degrees")
+        return "uncertified", None, "the noise is too large: angles are known to no more than a few degrees"
     if scale is not None:
         error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
         off = float((np.abs(found.scale - scale) / error).max())
         if 2 * ndtr(-off) >= CONFIDENCE:
-            return Verdict("certified", kept, sentences((fits, "the scale is the given one up to noise")))
-        return Verdict("uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations")
+            return "certified", kept, sentences((fits, "the scale is the given one up to noise"))
+        return "uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations"
     test = found.sums or {}
     if min(test["p_value"], test["largest_p_value"]) >= CONFIDENCE:
-        return Verdict("certified", kept, sentences((fits, "rows sum to zero up to noise")))
-    return Verdict("uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare")
+        return "certified", kept, sentences((fits, "rows sum to zero up to noise"))
+    return "uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare"
 
 
 _SUMS = {
