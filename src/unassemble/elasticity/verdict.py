@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..nodes.nodal import NodalMatrix
+from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
@@ -131,7 +131,7 @@ def _to_identities(solution: Solution, error: float, numbering: Numbering, nodal
             advice=GIVE_NUMBERING,
         )
     # Without a trace, doubtful ones aside, which get no coordinates.
-    odd = int(np.count_nonzero(nodal.lost.any(axis=1) & ~nodal.doubtful))
+    odd = int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
     if odd:
         nodes = count_of(odd, "node lacks", "nodes lack")
         lacking = f"{nodes} directions although no row next to it misses anything: its rows belong to other nodes"

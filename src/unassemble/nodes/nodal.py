@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..tolerances import CANCELLED
-from .constants import PENALTY, unaccounted
+from .constants import PENALTY
 from .numbering import Numbering
 
 
@@ -25,9 +25,6 @@ class NodalMatrix:
     row_of: NDArray[np.int64]  # (n, d) of the matrix, -1 where there is none
     size: NDArray[np.float64]  # (n,) mean absolute sum of a node's off-diagonal blocks, the unit of its equations
     penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
-    # (n, d) unknowns that are not there without a trace, as what was eliminated leaves in rows next to it: they stand
-    # elsewhere, and the node's rows were not recognised as those of one node
-    lost: NDArray[np.bool_]
     # (n,) nodes that lack a direction and have a row that may be another node's: none says that others lack it
     doubtful: NDArray[np.bool_]
 
@@ -85,8 +82,7 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     if numbering.open_row is not None:
         doubtful[numbering.node_of_row[numbering.open_row]] = True
         doubtful &= (rows < 0).any(axis=1)
-    lost = unaccounted(matrix, numbering.node_of_row, numbering.direction_of_row, d)
-    return NodalMatrix(indptr, indices, data, rows, size, penalised, lost, doubtful)
+    return NodalMatrix(indptr, indices, data, rows, size, penalised, doubtful)
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
@@ -112,7 +108,7 @@ def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0
-    return ~present & ~nodal.lost & np.asarray(present.any(axis=1))[:, None]
+    return ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
 
 
 def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -124,6 +120,18 @@ def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
     whole: NDArray[np.bool_] = np.asarray((valid | ~present[:, :, None]).all(axis=1))
     return np.asarray((whole | lacking | ~present).all(axis=1) & (whole & present & ~lacking).any(axis=1))
+
+
+def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d) unknowns that are not there, although no row coupled to the node misses anything.
+
+    What was eliminated leaves a trace in the rows next to it. Where there is none, the unknown stands
+    somewhere else: the node's rows were not recognised as those of one node.
+    """
+    present = nodal.row_of >= 0
+    missing = (~annihilating(nodal) & present[:, :, None]).any(axis=1)
+    some = np.asarray(present.any(axis=1))
+    return ~present & (nodal.graph @ missing.astype(float) == 0) & some[:, None]
 
 
 def annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
