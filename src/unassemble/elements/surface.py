@@ -50,11 +50,6 @@ def outer_facets(blocks: Blocks) -> list[NDArray[np.int64]]:
 
     Sides of quadratic cells in the plane are two facets each; in space facets have the nodes in the middle of their
     sides between their corners.
-
-    Parameters
-    ----------
-    blocks : mapping of str to (m, k) int64
-        Cells by kind, meshio's names.
     """
     return [some[~_repeated(_labels(some))] for some in _facets(blocks).values()]
 

@@ -29,21 +29,10 @@ class Shape:
 
 
 def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
-    """Find the coordinates among the least singular fields.
+    """Find the coordinates among the least singular fields (n, d, k), orthonormal, with increasing singular values (k,).
 
-    Parameters
-    ----------
-    fields : (n, d, k) float64
-        Orthonormal.
-    values : (k,) float64
-        Increasing singular values.
-    told : (n,) bool
-        Nodes with a valid row of their own; supports do not leave these loose.
-
-    Raises
-    ------
-    GeometryError
-        If the null space leaves more than an affine map free, or there are too few nodes.
+    Nodes with a valid row of their own, `told` (n,), are not left loose by supports. GeometryError if the null space
+    leaves more than an affine map free, or there are too few nodes.
     """
     n, d, k = fields.shape
     if k <= d:

@@ -27,21 +27,9 @@ MORE_THAN_STIFFNESS = (
 
 
 def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbering:
-    """Recognise nodes and directions.
+    """Recognise nodes and directions of a symmetric matrix (N, N), with 2 or 3 unknowns per node if that is known.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    block_size : int, optional
-        2 or 3, where it is known.
-
-    Raises
-    ------
-    InputError
-        If the block size is neither 2 nor 3.
-    RecoveryError
-        If no numbering makes rows annihilate constants.
+    InputError for other block sizes, RecoveryError if no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
     best = _in_order(matrix, sizes)
@@ -156,12 +144,9 @@ def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -
 
 
 def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
-    """A numbering that the caller knows.
+    """A numbering that the caller knows: node and direction of each row, (N,).
 
-    Raises
-    ------
-    InputError
-        If two rows have the same node and direction, or the arrays do not fit the matrix.
+    InputError if two rows have the same node and direction, or the arrays do not fit the matrix.
     """
     node, direction = np.asarray(node_of_row, dtype=np.int64), np.asarray(direction_of_row, dtype=np.int64)
     order = matrix.shape[0]

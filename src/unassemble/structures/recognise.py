@@ -51,15 +51,7 @@ class StructuralNumbering:
 def find_structure(
     matrix: sp.csr_array, kind: str | None = None, block_size: int | None = None
 ) -> StructuralNumbering | None:
-    """Recognise the matrix of a structure; None if it is none.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    kind : {None, "interleaved", "by component"}
-    block_size : int, optional
-    """
+    """Recognise the symmetric matrix (N, N) of a structure, in one `kind` of order or any; None if it is none."""
     order, orders = matrix.shape[0], ORDERS if kind is None else (kind,)
     sizes = {
         layout.block_size for layout in _KNOWN if order % layout.block_size == 0 and order >= 2 * layout.block_size
