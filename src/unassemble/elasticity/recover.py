@@ -23,8 +23,7 @@ from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
-from .nullspace.placing import Solution
-from .nullspace.springs import without_springs
+from .nullspace.placing import Solution, without_springs
 from .positions import solve
 from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, no_positions, verdict
 

@@ -29,7 +29,7 @@ class Shape:
 
 
 def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
-    """Find the coordinates among the least singular fields (n, d, k), orthonormal, with increasing singular values (k,).
+    """Find the coordinates among least singular fields (n, d, k), orthonormal, with increasing singular values (k,).
 
     Nodes with a valid row of their own, `told` (n,), are not left loose by supports. GeometryError if the null space
     leaves more than an affine map free, or there are too few nodes.
