@@ -41,7 +41,7 @@ def solve(nodal: NodalMatrix) -> Solution:
             found = _with_planes(nodal, found, valid)
     if not (found is not None and found.unique):
         found = straightened(nodal, found, valid)
-        if found is not None and found.straight and found.planes:  # elements told axes only
+        if found is not None and found.straight and found.planes:  # elements told axes only, and no planes
             found = replace(found, hanging=determined(found.points))
     if found is None:
         raise failure or GeometryError("no positions fit the valid rows")

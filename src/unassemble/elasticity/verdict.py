@@ -25,10 +25,6 @@ RESTS_ON_PLANES = Reason(
     "elements show that they do",
     WITHOUT_SUPPORTS,
 )
-_FREEDOMS = {
-    "axes": "each axis keeps a scale of its own",
-    "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-}
 
 
 def no_positions(why: object) -> str:
@@ -89,10 +85,9 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
 
     Entries that are rounded have no `exact` null vector.
     """
-    remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
-    if remaining:
+    if any(solution.freedoms):
         unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
-        larger = f"the null space is larger than it should be: {remaining[0]}"
+        larger = "an affine map stays free, since the material around every valid row is homogeneous"
         return Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
     if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)

@@ -23,7 +23,7 @@ class Shape:
     # (n, d) centred, of norm one; NaN where loose: of nodes that can move while the others stay
     points: NDArray[np.float64]
     dimension: int  # of the null space without loose nodes; that of the translations where no field is exact
-    freedom: str  # beyond translation and scale: "", "axes" or "affine"
+    freedom: str  # beyond translation and scale: "" or "affine"
     exact: bool  # whether the field is a null field, not only the best one
     null: int  # fields that count as null fields, those of loose nodes among them
 
@@ -89,12 +89,8 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
         raise GeometryError("the valid rows are satisfied with all nodes in one plane only: some of them are not whole")
     if k == 1:
         return moving[..., 0], ""
-    if k == 0:
-        raise GeometryError("no field but translations fits the valid rows: this is no isotropic elasticity matrix")
     single = [svd(moving[:, a], full_matrices=False) for a in range(d)]
     ranks = [int((s > ALIKE).sum()) for _, s, _ in single]
-    if k == d and ranks == [1] * d:
-        return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
     if k == d * d and ranks == [d] * d:
         return single[0][0][:, :d] / np.sqrt(d), "affine"
     raise GeometryError(

@@ -41,8 +41,6 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
         if rule is None:
             return
         found, entries = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
-        if np.isnan(found).any():
-            return
         lame.append(found)
     if not simple:
         yield rich, np.vstack(lame), entries.largest
