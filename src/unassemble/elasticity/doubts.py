@@ -104,22 +104,18 @@ def about_nodes(
     that no others would contradict, `lone`.
     """
     sprung = loose & (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
-    rest = loose & ~withheld & ~hanging & ~lone & ~sprung
-    them = "it" if rest.sum() == 1 else "them"
-    for some, is_, are, said in (
-        (sprung, "hangs", "hang", "on springs, or on nothing, and have no position: no linear field knows a spring"),
-        (withheld, "has", "have", "rows that no element shows to be theirs. Since it was inferred which rows make up a "
-         "node, no coordinates are given there"),
-        (hanging & ~withheld, "is", "are", "determined only if nodes that lack a direction lie in planes across it, "
-         "which neither another equation nor an element confirms. No coordinates are given there"),
-        (lone, "is", "are", "determined by identities that no others check, nor an element. No coordinates are given "
-         "there"),
-        (rest, "is", "are", f"not determined: rows coupled to {them} lack entries, as next to eliminated unknowns, or "
-         "belong to other axes, as at inclined supports, and no equation that holds for every element and material is "
-         "left of these"),
+    for some, said in (
+        (sprung, "on springs, or on nothing: no linear field knows a spring"),
+        (withheld, "no element shows that its rows are its own, and which rows make up a node was inferred"),
+        (hanging & ~withheld, "determined only if nodes that lack a direction lie in planes across it, which neither "
+         "another equation nor an element confirms"),
+        (lone, "determined by identities that no others check, nor an element"),
+        (loose & ~withheld & ~hanging & ~lone & ~sprung, "rows coupled to it lack entries, as next to eliminated "
+         "unknowns, or belong to other axes, as at inclined supports, and no equation that holds for every element and "
+         "material is left of these"),
     ):  # fmt: skip
         if some.any():
-            yield f"{count_of(int(some.sum()), f'node {is_}', f'nodes {are}')} {said}"
+            yield f"no position for {count_of(int(some.sum()), 'node')}: {said}"
 
 
 def about_assumptions(solution: Solution, guessed: int) -> Iterator[str]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from ..nodes.nodal import NodalMatrix, determined, eliminated, surrounded, valid_pairs
 from .nullspace.placing import Solution, placed
-from .straight.straight import straightened
+from .straight import straightened
 
 # Nodes of a body in space beyond which planes are asked at once where there are rollers: without them rows next to
 # rollers leave hundreds of fields free, all of which charts would look for.
@@ -41,7 +41,7 @@ def solve(nodal: NodalMatrix) -> Solution:
             found = _with_planes(nodal, found, valid)
     if not (found is not None and found.unique):
         found = straightened(nodal, found, valid)
-        if found is not None and found.straight and found.planes:  # elements told axes only
+        if found is not None and found.straight and found.planes:  # elements told axes only, and no planes
             found = replace(found, hanging=determined(found.points))
     if found is None:
         raise failure or GeometryError("no positions fit the valid rows")

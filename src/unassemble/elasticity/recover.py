@@ -16,27 +16,16 @@ from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
 from ..recovery import Body
-from ..tolerances import ALIKE, LAST_DIGITS
+from ..tolerances import ALIKE
 from ..words import Reason
 from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
-from .nullspace.placing import Solution
-from .nullspace.springs import without_springs
+from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import (
-    NOTHING_CHECKED,
-    NOTHING_SHOWN,
-    RESTS_ON_PLANES,
-    about_made_up_nodes,
-    about_open_rows,
-    hidden,
-    no_positions,
-    of_few_digits,
-    verdict,
-)
+from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, no_positions, verdict
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -53,11 +42,10 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
         except RecoveryError as error:
             if not numbering.inferred:
                 raise
-            raise GeometryError(no_positions(about_open_rows(numbering) or error)) from error
-        why = about_made_up_nodes(nodal, numbering, solution, request.rounding) if numbering.inferred else ""
-        if why:
-            raise GeometryError(no_positions(why))
-
+            raise GeometryError(no_positions(error)) from error
+    made_up = numbering.inferred and numbering.incomplete and (numbering.odd or numbering.common < 1)
+    if made_up and not solution.exact and request.rounding is None:  # points of rows of several nodes are none
+        raise GeometryError(no_positions("none fit exactly, as where constraints tie unknowns together"))
     return _described(nodal, numbering, solution, request)
 
 
@@ -80,21 +68,18 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
-    status, reason = verdict(nodal, solution, error, found, numbering)
-    alone = status == "certified" and not found.certified
+    bar = None
+    if rounding and near and not any(solution.freedoms):
+        with request.clock("certify"):
+            bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
+    status, reason = verdict(nodal, solution, error, found, numbering, rounding, bar)
+    alone = status == "certified" and not found.certified and bar is None
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))
     simplex = nodal.n <= nodal.dim + 1  # whose rows may all depend on one
     if alone and (simplex or not (determined(solution.points) & ~lone).any()):
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
-    bar = None
-    if rounding and near and not any(solution.freedoms):
-        with request.clock("certify"):
-            bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
-        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, bar)
-    elif rounding:
-        reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, solution.points, found.shown)
@@ -107,13 +92,15 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     shown = found.among(kept)
     loose = ~determined(placed)
     component = np.where(loose, -1, solution.component)
-    if status == "certified" and loose.all():
-        status, reason = "uncertified", NOTHING_SHOWN
-    if status == "certified" and _flat(placed, component):
-        status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
     bulk, shear = np.abs(found.lame).T
-    if status == "certified" and (shear <= ALIKE * bulk).any():
-        status, reason = "uncertified", Reason("elements have no shear stiffness, and any vectors that cancel are such")
+    bodies = [placed[component == k] for k in range(component.max(initial=-1) + 1)]
+    for against, why in (
+        (loose.all(), NOTHING_CHECKED),
+        (any(map(_flat, bodies)), Reason("the points lie in one line or plane, and no solid body does")),
+        ((shear <= ALIKE * bulk).any(), Reason("elements have no shear stiffness: any vectors that cancel are such")),
+    ):
+        if status == "certified" and against:
+            status, reason = "uncertified", why
     held = request.held(numbering.node_of_row, nodal.dim)
     points, factor, notes, (status, reason) = anchored(
         placed, component, len(solution.evidence), held, (status, reason), edge=1.0
@@ -173,15 +160,9 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
     return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
 
 
-def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
+def _flat(points: NDArray[np.float64]) -> bool:
     """Whether the nodes of a piece do not span space, so that no element there has a volume."""
-    d = points.shape[1]
-    for piece in np.unique(component[component >= 0]):
-        x = points[component == piece]
-        spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
-        if spread[0] <= LAST_DIGITS * max(spread[-1], 1.0):  # mean edges have length one
-            return True
-    return False
+    return len(points) > 0 and np.linalg.matrix_rank(points - points.mean(axis=0), rtol=ALIKE) < points.shape[1]
 
 
 _FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}

@@ -15,17 +15,9 @@ from .materials.cells import Cells
 from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
-NOTHING_SHOWN = Reason(
-    "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption", GIVE_NUMBERING
-)
-NOTHING_LEFT = Reason(
-    "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
-    "and no elements do",
-    WITHOUT_SUPPORTS,
-)
 NOTHING_CHECKED = Reason(
-    "identities have no others to check against, so that wrong entries would go unnoticed, and no elements were found "
-    "that re-assemble to the matrix",
+    "no identities are left that have others to check against, so that wrong entries would go unnoticed, and no "
+    "elements were found that re-assemble to the matrix",
     WITHOUT_SUPPORTS,
 )
 RESTS_ON_PLANES = Reason(
@@ -35,93 +27,52 @@ RESTS_ON_PLANES = Reason(
 )
 
 
-def about_open_rows(numbering: Numbering) -> str:
-    """What is not known of rows that may belong to one node with others; empty where there are none."""
-    rows = 0 if numbering.open_row is None else int(numbering.open_row.sum())
-    if not rows:
-        return ""
-    return (
-        f"{count_of(rows, 'row couples', 'rows couple')} to the same unknowns as rows of other nodes, and neither "
-        "order nor positions tell which of them belong together"
-    )
-
-
 def no_positions(why: object) -> str:
     """Why there are none, and what may be to blame where it was inferred which rows belong to one node."""
     blame = f"which rows belong to one node, and to which direction, was inferred: {GIVE_NUMBERING}"
     return sentences([f"no positions were found: {why}", blame])
 
 
-def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution, rounding: Rounding | None) -> str:
-    """Why positions say nothing where it was inferred which rows are one node's; empty where they do.
-
-    Fields that are left then move rows of one direction only, as if there were more nodes; and the points that belong
-    to rows of several nodes are none of the body's.
-    """
-    lacking = _lacking(nodal) if any(solution.freedoms) and numbering.open_row is None else ""
-    if lacking:
-        return f"{lacking}, so that rows were not joined to nodes as they should be"
-    if not solution.exact and rounding is None and numbering.incomplete and (numbering.odd or numbering.common < 1):
-        return "none fit the matrix exactly, as where constraints tie unknowns together"
-    return ""
-
-
-def of_few_digits(
-    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding, known: Known
-) -> tuple[str, Reason]:
-    """Status and reason where the entries are rounded, which is an error bar: how well positions are known."""
-    objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
-    if objection:
-        return "uncertified", hidden(objection, rounding)
-    if np.isnan(error):
-        return "uncertified", NOTHING_LEFT
-    holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e} (relative)"
-    if not (error <= max(rounding.spread, CERTIFIED) and known.explained):
-        return "uncertified", Reason(
-            f"{holds}, which is more than that leaves, so that positions may be off by more than it moves them"
-        )
-    said = f"{holds}, which is what that leaves, so that positions are known to {known.error:.0e} of the size"
-    return (
-        ("certified", Reason(said)) if known.error <= rounding.needed else ("uncertified", Reason(said, _MORE_DIGITS))
-    )
-
-
-def hidden(reason: Reason, rounding: Rounding) -> Reason:
-    """A reason not to certify rounded entries, with what may be behind it."""
-    return replace(reason, advice=f"{_MORE_DIGITS}: they are rounded to {rounding.name}, which may hide what rows lack")
-
-
-_MORE_DIGITS = "write the entries with more digits"
-_FREEDOMS = {
-    "axes": "each axis keeps a scale of its own",
-    "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-}
-
-
 def verdict(
-    nodal: NodalMatrix, solution: Solution, error: float, found: Cells, numbering: Numbering
+    nodal: NodalMatrix,
+    solution: Solution,
+    error: float,
+    found: Cells,
+    numbering: Numbering,
+    rounding: Rounding | None,
+    known: Known | None,
 ) -> tuple[str, Reason]:
-    """Status and reason, by the largest residual of a valid identity and the cells that were found."""
-    objection = _to_positions(nodal, solution, numbering)
-    if objection:
-        return "uncertified", objection
-    if found.certified and found.backward_error <= CERTIFIED:
+    """Status and reason, by the largest residual of a valid identity and the cells that were found.
+
+    `rounding` of entries is an error bar: how well positions are `known` with it, None where that was not asked.
+    """
+    objection = _to_positions(nodal, solution, numbering, exact=known is None)
+    if known is None and not objection and found.certified and found.backward_error <= CERTIFIED:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
-    nearly = _softest(solution)
-    objection = _to_identities(nodal, solution, numbering)
-    if objection:
-        return "uncertified", objection
-    if np.isnan(error):
-        return "uncertified", NOTHING_LEFT
-    if error > CERTIFIED:
-        return "uncertified", Reason(f"the largest residual of a valid identity is {error:.1e} (relative)")
-    if error > _MAGNIFIED * nearly:
-        return "uncertified", Reason(
-            f"the valid identities hold to {error:.1e} (relative), but a field that is no translation or scale "
-            f"satisfies them up to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
-        )
-    return "certified", Reason("the valid identities hold to rounding, and only translations and scale satisfy them")
+    objection = objection or _to_identities(solution, error, numbering, nodal)
+    holds = f"the valid identities hold to {error:.1e} (relative)"
+    if rounding and known:
+        sure = f"{holds}, which is what entries rounded to {rounding.name} leave, so that positions are known to "
+        sure += f"{known.error:.0e} of the size"
+        if not (error <= max(rounding.spread, CERTIFIED) and known.explained):
+            objection = objection or Reason(f"{holds}, more than entries rounded to {rounding.name} leave")
+        elif known.error > rounding.needed:
+            objection = objection or Reason(sure)
+    else:
+        nearly = _softest(solution)
+        sure = "the valid identities hold to rounding, and only translations and scale satisfy them"
+        if error > CERTIFIED:
+            objection = objection or Reason(f"the largest residual of a valid identity is {error:.1e} (relative)")
+        elif error > _MAGNIFIED * nearly:
+            objection = objection or Reason(
+                f"{holds}, but a field that is no translation or scale satisfies them up to {nearly:.1e}: nodes that "
+                "it moves may be wrong by more than 1e-8"
+            )
+    if objection and rounding:
+        more = f"write more digits of the entries: they are rounded to {rounding.name}, which may hide what rows lack"
+        objection = replace(objection, advice=more)
+    return ("uncertified", objection) if objection else ("certified", Reason(sure))
 
 
 def _softest(solution: Solution) -> float:
@@ -134,10 +85,9 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
 
     Entries that are rounded have no `exact` null vector.
     """
-    remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
-    if remaining:
+    if any(solution.freedoms):
         unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
-        larger = f"the null space is larger than it should be: {remaining[0]}"
+        larger = "an affine map stays free, since the material around every valid row is homogeneous"
         return Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
     if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
@@ -162,7 +112,7 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
     return None
 
 
-def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason | None:
+def _to_identities(solution: Solution, error: float, numbering: Numbering, nodal: NodalMatrix) -> Reason | None:
     """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
     if solution.straight:
         return Reason(
@@ -175,15 +125,13 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
             "only elements that re-assemble to the matrix would show that it is right",
             advice=GIVE_NUMBERING,
         )
-    lacking = _lacking(nodal)
-    return Reason(f"{lacking}: its rows belong to other nodes", GIVE_NUMBERING) if lacking else None
-
-
-def _lacking(nodal: NodalMatrix) -> str:
-    """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates; empty for none."""
+    # Without a trace, doubtful ones aside, which get no coordinates.
     odd = int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
-    nodes = count_of(odd, "node lacks", "nodes lack")
-    return f"{nodes} directions although no row next to it misses anything" if odd else ""
+    if odd:
+        nodes = count_of(odd, "node lacks", "nodes lack")
+        lacking = f"{nodes} directions although no row next to it misses anything: its rows belong to other nodes"
+        return Reason(lacking, GIVE_NUMBERING)
+    return NOTHING_CHECKED if np.isnan(error) else None
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:

@@ -4,11 +4,10 @@ Nothing here knows what a matrix belongs to: scalar and vector-valued operators 
 element matrices and candidates.
 """
 
-from .boxes import ordered_boxes
 from .candidates import candidates
 from .cliques import Graph
 from .kinds import KINDS
-from .ordering import ordered
+from .ordering import ordered, ordered_boxes
 from .reference import (
     assembled,
     elasticity,

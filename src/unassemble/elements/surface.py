@@ -49,23 +49,9 @@ def outer_facets(blocks: Blocks) -> list[NDArray[np.int64]]:
     """Facets that no other cell shares, (f, r) for each number r of nodes, seen counter-clockwise from outside.
 
     Sides of quadratic cells in the plane are two facets each; in space facets have the nodes in the middle of their
-    sides between their corners. A facet of four corners on which triangles of other cells lie is none of the outside,
-    and neither are these.
-
-    Parameters
-    ----------
-    blocks : mapping of str to (m, k) int64
-        Cells by kind, meshio's names.
+    sides between their corners.
     """
-    facets = _facets(blocks)
-    for size, some in facets.items():
-        facets[size] = some[~_repeated(_labels(some))]
-    if {3, 4} <= facets.keys():
-        halves = facets[4][:, [[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]]]
-        covered = among(halves.reshape(-1, 3), facets[3]).reshape(-1, 4).any(axis=1)
-        inner = among(facets[3], halves[covered].reshape(-1, 3))
-        facets = {3: facets[3][~inner], 4: facets[4][~covered]}
-    return list(facets.values())
+    return [some[~_repeated(_labels(some))] for some in _facets(blocks).values()]
 
 
 def _facets(blocks: Blocks) -> dict[int, NDArray[np.int64]]:
@@ -139,8 +125,6 @@ def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]
     Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
     """
     (edges,) = outer_facets(blocks)
-    if not len(edges):
-        return edges.reshape(0, 2), np.zeros(1, np.int64)
     successor = np.empty(len(edges), np.int64)
     # As many edges leave a vertex as enter it.
     successor[np.argsort(edges[:, 1], kind="stable")] = np.argsort(edges[:, 0], kind="stable")

@@ -68,20 +68,9 @@ def with_exact_sums(
 ) -> tuple[sp.csr_array, Rounding | None]:
     """Take the rounding out of rows that annihilate translations, if unknowns stand in one of the usual orders.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    candidates : iterable of ((N,) int64, int)
-        Further directions of rows to try, -1 where not known, and how many there are.
-    known : ((N,) int64, int), optional
-        The directions, in place of all that could be tried: with others few rows add up to zero.
-
-    Returns
-    -------
-    matrix : (N, N) sparse
-        The given one where there is nothing to do.
-    rounding : Rounding, optional
-        None where nothing was done.
+    `candidates` are further directions of rows to try, (N,) with -1 where not known, and how many there are; `known`
+    ones are taken in place of all that could be tried: with others few rows add up to zero. The given matrix (N, N) and
+    None where there is nothing to do.
     """
     digits = Digits.of(matrix.data)
     if digits is None:

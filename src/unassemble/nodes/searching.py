@@ -43,13 +43,6 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = 
     return found
 
 
-def same_cuts(matrix: sp.csr_array, regular: Numbering) -> bool:
-    """Whether rows show the same cuts between directions as the order without gaps has, so that it is the only one."""
-    live, inner = live_part(matrix)
-    direction = directions_by_component(inner, regular.block_size)
-    return direction is not None and np.array_equal(direction, regular.direction_of_row[live])
-
-
 def directions_in_order(
     inner: sp.csr_array, d: int, rounding: float | NDArray[np.float64]
 ) -> Iterator[NDArray[np.int64]]:

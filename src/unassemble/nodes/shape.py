@@ -23,27 +23,16 @@ class Shape:
     # (n, d) centred, of norm one; NaN where loose: of nodes that can move while the others stay
     points: NDArray[np.float64]
     dimension: int  # of the null space without loose nodes; that of the translations where no field is exact
-    freedom: str  # beyond translation and scale: "", "axes" or "affine"
+    freedom: str  # beyond translation and scale: "" or "affine"
     exact: bool  # whether the field is a null field, not only the best one
     null: int  # fields that count as null fields, those of loose nodes among them
 
 
 def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
-    """Find the coordinates among the least singular fields.
+    """Find the coordinates among least singular fields (n, d, k), orthonormal, with increasing singular values (k,).
 
-    Parameters
-    ----------
-    fields : (n, d, k) float64
-        Orthonormal.
-    values : (k,) float64
-        Increasing singular values.
-    told : (n,) bool
-        Nodes with a valid row of their own; supports do not leave these loose.
-
-    Raises
-    ------
-    GeometryError
-        If the null space leaves more than an affine map free, or there are too few nodes.
+    Nodes with a valid row of their own, `told` (n,), are not left loose by supports. GeometryError if the null space
+    leaves more than an affine map free, or there are too few nodes.
     """
     n, d, k = fields.shape
     if k <= d:
@@ -100,12 +89,8 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
         raise GeometryError("the valid rows are satisfied with all nodes in one plane only: some of them are not whole")
     if k == 1:
         return moving[..., 0], ""
-    if k == 0:
-        raise GeometryError("no field but translations fits the valid rows: this is no isotropic elasticity matrix")
     single = [svd(moving[:, a], full_matrices=False) for a in range(d)]
     ranks = [int((s > ALIKE).sum()) for _, s, _ in single]
-    if k == d and ranks == [1] * d:
-        return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
     if k == d * d and ranks == [d] * d:
         return single[0][0][:, :d] / np.sqrt(d), "affine"
     raise GeometryError(

@@ -19,7 +19,7 @@ from .constants import row_sizes
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .numbering import Numbering, measured
 from .orders import ORDERS, Reading, regular
-from .searching import same_cuts, searched
+from .searching import searched
 
 MORE_THAN_STIFFNESS = (
     "a mass matrix, a multiple of the identity or springs at all nodes were added, or unknowns are scaled one by one"
@@ -27,21 +27,9 @@ MORE_THAN_STIFFNESS = (
 
 
 def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbering:
-    """Recognise nodes and directions.
+    """Recognise nodes and directions of a symmetric matrix (N, N), with 2 or 3 unknowns per node if that is known.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    block_size : int, optional
-        2 or 3, where it is known.
-
-    Raises
-    ------
-    InputError
-        If the block size is neither 2 nor 3.
-    RecoveryError
-        If no numbering makes rows annihilate constants.
+    InputError for other block sizes, RecoveryError if no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
     best = _in_order(matrix, sizes)
@@ -139,8 +127,6 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     rows that couple to different nodes can be one node's all the same, as entries that vanished need not be stored.
     """
     impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
-    if regular.kind == "by component" and not impossible and same_cuts(matrix, regular):
-        return regular
     for one in searched(matrix, sizes, as_stored=True):
         unlike = (one.direction_of_row != regular.direction_of_row) & ~regular.identity_row  # which has any
         contradicts = (unlike if one.unnamed is None else unlike & ~one.unnamed).any()  # by sums that prove
@@ -158,12 +144,9 @@ def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -
 
 
 def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
-    """A numbering that the caller knows.
+    """A numbering that the caller knows: node and direction of each row, (N,).
 
-    Raises
-    ------
-    InputError
-        If two rows have the same node and direction, or the arrays do not fit the matrix.
+    InputError if two rows have the same node and direction, or the arrays do not fit the matrix.
     """
     node, direction = np.asarray(node_of_row, dtype=np.int64), np.asarray(direction_of_row, dtype=np.int64)
     order = matrix.shape[0]
@@ -171,7 +154,7 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
         raise InputError(f"node and direction are needed for each of the {order} rows")
     d = int(direction.max()) + 1
     if d not in (2, 3) or direction.min() < 0:
-        raise InputError("directions are numbered 0, 1 and, in space, 2")
+        raise InputError("directions are numbered from 0: solids have 2 or 3, beams 4, frames and shells 3 or 6")
     node = by_first_row(node)
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")

@@ -1,9 +1,9 @@
 """Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
 
 from .beams import Beam, serve_beam
-from .connected import pieces
 from .frames import serve_structure
 from .layouts import Layout
+from .placed import pieces
 from .recognise import StructuralNumbering, find_structure, given_structure
 from .trusses import truss_numbering
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from ..nodes.anchoring import Request, anchored
 from ..nodes.numbering import Numbering
 from ..recovery import Structure
-from ..words import Reason
+from ..tolerances import ROUNDED
+from ..words import GIVE_NUMBERING, Reason
 from .placed import Placed
 from .recognise import StructuralNumbering
 
@@ -37,6 +38,8 @@ def answer(
     """
     held = request.held(numbering.node_of_row, found.points.shape[1])
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
+    if verdict[0] == "certified" and 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
+        verdict = "uncertified", Reason("most nodes that are coupled are in one place", GIVE_NUMBERING)
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
     points, factor, more, (status, reason) = anchored(
         found.points, found.component, len(found.evidence), held, verdict, edge, sized=sized

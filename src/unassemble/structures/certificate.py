@@ -1,17 +1,21 @@
 """The certificate of a structure's coordinates: its rigid rotations cost nothing, and its members' blocks are theirs.
 
-Nothing is shared with the solver: members between the points, as they are written, are set up by the textbook.
+Positions come from other formulas. Here members between the points, as they are written, are set up by the textbook.
+The couplings of nodes show whether their rows were joined rightly.
 """
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
-from .layouts import Layout
+from ..tolerances import CANCELLED
+from .layouts import PLANE, Layout
+from .members import balanced
 from .nodes import Nodes
 from .recognise import StructuralNumbering
-from .straight import Straight
+from .straight import Straight, misfits
 
 
 def forces(
@@ -47,40 +51,47 @@ def members_misfits(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Ends (k, 2) of straight members, and how far each block is from that of one between the points, part by part."""
     some = determined(points)[members.ends].all(axis=1)
-    ends, given = members.ends[some], members.blocks[some]
-    if not len(ends):
-        return ends, np.empty(0)
-    moves = len(layout.displacements)
-    place = np.array([*layout.displacements, *(3 + k for k in layout.rotations)])
-    again = _member_blocks(given, points[ends[:, 1]] - points[ends[:, 0]], place)
-    parts = (slice(moves), slice(moves, None))
-    size = [np.abs(given[:, a, b]).max(axis=(1, 2)) for a in parts for b in parts]
-    off = [np.abs(again[:, a, b] - given[:, a, b]).max(axis=(1, 2)) for a in parts for b in parts]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        misfit = np.divide(off, size).max(axis=0)
-    return ends, np.where(np.isnan(misfit), np.inf, misfit)
+    ends = members.ends[some]
+    return ends, misfits(members.blocks[some], points[ends[:, 1]] - points[ends[:, 0]], layout)
 
 
-def _member_blocks(given: NDArray[np.float64], vectors: NDArray[np.float64], place: NDArray[np.int64]) -> NDArray:
-    """(m, b, b) blocks of members along vectors (m, d), which stretch, bend and twist like the given ones.
+def mispaired(
+    nodes: Nodes, points: NDArray[np.float64], inner: NDArray[np.bool_], allowed: float
+) -> tuple[int, int] | None:
+    """Two nodes that are not coupled as elements couple them, if there are any.
 
-    Deflections that meet the stiffness S = 12 E I / l^3 give -S between deflections, S l / 2 and -S l / 2 between
-    deflections and slopes, and S l^2 / 6 between slopes, which are the rotations times the axis (Przemieniecki, Theory
-    of Matrix Structural Analysis, 1968, section 5.6). `place` holds the unknowns among three of either kind.
+    The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
+    and which of another are one node's. The couplings do: elements join whole nodes, so that two nodes meet in several
+    directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
+    are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
+    so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
+    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node. `inner`
+    (n,) are nodes whose forces are touched neither by supports nor by what was condensed.
     """
-    block = np.zeros((len(given), 6, 6))
-    block[:, place[:, None], place] = given
-    length = np.linalg.norm(vectors, axis=1)[:, None, None]
-    axis = np.zeros((len(given), 3, 1))
-    axis[:, : vectors.shape[1], 0] = vectors
-    axis = axis / np.where(length > 0, length, 1)
-    along = axis @ axis.transpose(0, 2, 1)
-    across = np.eye(3) - along
-    bending = -across @ (block + block.transpose(0, 2, 1))[:, :3, :3] @ across / 2
-    slopes = np.cross(np.eye(3), axis.transpose(0, 2, 1)).transpose(0, 2, 1)
-    bent = bending @ slopes * length / 2
-    again = np.zeros_like(block)
-    again[:, :3, :3] = along @ block[:, :3, :3] @ along - bending
-    again[:, :3, 3:], again[:, 3:, :3] = bent, -bent.transpose(0, 2, 1)
-    again[:, 3:, 3:] = along @ block[:, 3:, 3:] @ along + slopes.transpose(0, 2, 1) @ bent * length / 3
-    return again[:, place[:, None], place]
+    n, b = nodes.n, nodes.layout.block_size
+    coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
+    real = np.abs(coo.data) > CANCELLED * np.sqrt(size[coo.row] * size[coo.col])  # penalties are no measure
+    (i, one), (j, other) = np.divmod(coo.row[real], b), np.divmod(coo.col[real], b)
+    near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
+    first, second = sp.triu(near, 1).nonzero()
+    shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
+    known = determined(points)
+    strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
+    if not nodes.layout.rotations:  # bars along an axis have one direction
+        strange &= ~balanced(nodes, points, first, second, allowed)[0]
+    if nodes.layout == PLANE:
+        pattern = (near > 0).astype(np.int32)
+        degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
+        twins = (common == degree[first]) & (common == degree[second])
+        balances, whole = balanced(nodes, points, first, second, allowed)
+        joined = np.zeros(n, dtype=bool)
+        joined[first[whole & balances]] = joined[second[whole & balances]] = True
+        excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
+        strange |= twins | (whole & ~balances & ~excused)
+    strange &= known[first] | known[second]
+    k = int(np.argmax(strange)) if strange.any() else None
+    return None if k is None else (int(first[k]), int(second[k]))
+
+
+def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(n, n))

@@ -11,13 +11,12 @@ from ..linalg import blas_threads
 from ..nodes.anchoring import Request
 from ..nodes.rounded import Known, Rounding, known_to, with_exact_sums
 from ..recovery import Structure
-from ..tolerances import ALIKE, CANCELLED, CERTIFIED, ROUNDED, SUMMED
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
-from .certificate import forces, members_misfits
+from .certificate import forces, members_misfits, mispaired
 from .contradicted import said_of
 from .members import members_and_cells
-from .mispaired import mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed
 from .recognise import StructuralNumbering
@@ -37,7 +36,6 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     spread = rounding.spread if rounding else 0.0
     with request.clock("solve"):
         nodes, members, found, valid = _placed(whole, numbering, rounding)
-    edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
     with request.clock("certify"):
         force, used = forces(whole, numbering, nodes, found.points, valid)
         ends, misfit = members_misfits(members, layout, found.points)
@@ -45,9 +43,6 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
         error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
         known = _known(error, force, found, members, numbering, rounding)
         status, reason = _verdict(error, known, found, len(ends), rounding, sized=sized)
-        length = np.linalg.norm(found.points[edges[:, 1]] - found.points[edges[:, 0]], axis=1)
-        if status == "certified" and 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
-            status, reason = "uncertified", Reason("most nodes that are coupled are in one place", GIVE_NUMBERING)
         pair = None
         if status == "certified" and numbering.kind != "given":
             inner: NDArray[np.bool_] = np.asarray(valid[:, :moves].all(axis=(1, 2)))
@@ -84,7 +79,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
         request,
         found,
         (status, reason),
-        edges=edges,
+        edges=np.column_stack(sp.triu(nodes.graph, 1).nonzero()),
         sized=sized,
         free="size and sign are free: nodes have no rotations, from which angles would tell lengths",
         notes=notes,

@@ -118,7 +118,7 @@ def _shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]
         some = entries_at(matrix, i + k, j + k) < 0
         i, j = i[some], j[some]
     blocks = blocks_at(matrix, i, j, b)
-    good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
+    good = misfits(blocks, -told_by_blocks(blocks, layout), layout) <= SUMMED
     begins = np.zeros(order, dtype=bool)
     begins[i[good]] = begins[j[good]] = True
     return begins

@@ -1,7 +1,8 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,8 +12,51 @@ from ..errors import GeometryError
 from ..nodes.nodal import determined
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
-from ..words import count_of
-from .connected import Piece, pieces
+
+
+class Piece(NamedTuple):
+    """Equations that share no node with others."""
+
+    nodes: NDArray[np.int64]  # (k,), increasing
+    rows: NDArray[np.int64]  # (m,) of the equations of all pieces
+    operator: sp.csr_array  # (m, k d)
+    edges: NDArray[np.int64]  # (e, 2) coupled nodes, by their place in `nodes`
+
+
+def pieces(
+    operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> Iterator[Piece]:
+    """Connected pieces, in the order of their first nodes, of equations (m, n d); nodes in no equation are in none.
+
+    The work is that of one pass over the equations, however many pieces there are. Coupled nodes, `edges` (e, 2), of
+    different pieces are left out; `rows` (k,) are the equations to use, all by default.
+    """
+    rows = np.arange(operator.shape[0]) if rows is None else rows
+    operator = sp.csr_array(operator[rows])
+    m, n = operator.shape[0], operator.shape[1] // d
+    node = operator.indices // d
+    row = np.repeat(np.arange(m), np.diff(operator.indptr))
+    incidence = sp.csr_array((np.ones(len(node), np.int8), (row, m + node)), shape=(m + n, m + n))
+    count, label = sp.csgraph.connected_components(incidence, directed=False)
+    of_row, of_node = label[:m], label[m:]
+    inside = edges[of_node[edges[:, 0]] == of_node[edges[:, 1]]]
+    bodies, equations, links = (_groups(one, count) for one in (of_node, of_row, of_node[inside[:, 0]]))
+    place = np.empty(n, np.int64)
+    for body in bodies:
+        place[body] = np.arange(len(body))
+    used = [k for k in range(count) if len(bodies[k]) and len(equations[k])]
+    for k in sorted(used, key=lambda k: bodies[k][0]):
+        part = sp.csr_array(operator[equations[k]])
+        columns = place[part.indices // d] * d + part.indices % d
+        local = sp.csr_array((part.data, columns, part.indptr), shape=(len(equations[k]), len(bodies[k]) * d))
+        yield Piece(bodies[k], rows[equations[k]], local, place[inside[links[k]]])
+
+
+def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
+    """Indices of each label, increasing."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
+
 
 # Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
 # being noticed; see :mod:`.turning`.
@@ -44,25 +88,14 @@ class Placed:
 
 
 def without_free(found: Placed, most: int) -> Placed:
-    """Positions of pieces whose null space has no larger dimension: others mean nothing. GeometryError for none."""
-    free = np.array([one.null_dimension > most for one in found.evidence])
-    if not free.any():
-        return found
-    said = f"the null space has dimension {found.null_dimension} where {most} is expected"
-    if free.all():
+    """The same; GeometryError where the null space of a piece has a larger dimension: positions mean nothing."""
+    if found.null_dimension > most:
         raise GeometryError(
-            f"no positions were found: {said}. Supports leave too few whole rows, or unknowns of nodes are along axes "
-            "of their own, as in cylindrical coordinates"
+            f"no positions were found: the null space has dimension {found.null_dimension} where {most} is expected. "
+            "Supports leave too few whole rows, or unknowns of nodes are along axes of their own, as in cylindrical "
+            "coordinates"
         )
-    place = np.append(np.where(free, -1, np.cumsum(~free) - 1), -1)
-    component = place[found.component]
-    return replace(
-        found,
-        points=np.where(component[:, None] < 0, np.nan, found.points),
-        component=component,
-        evidence=tuple(one for one in found.evidence if one.null_dimension <= most),
-        notes=(*found.notes, f"{said} in {count_of(int(free.sum()), 'piece')}, which were left out"),
-    )
+    return found
 
 
 def placed(

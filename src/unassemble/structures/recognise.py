@@ -12,7 +12,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import SAMPLE
-from ..errors import InputError
 from ..nodes.grouping import by_first_row, pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
@@ -52,15 +51,7 @@ class StructuralNumbering:
 def find_structure(
     matrix: sp.csr_array, kind: str | None = None, block_size: int | None = None
 ) -> StructuralNumbering | None:
-    """Recognise the matrix of a structure; None if it is none.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    kind : {None, "interleaved", "by component"}
-    block_size : int, optional
-    """
+    """Recognise the symmetric matrix (N, N) of a structure, in one `kind` of order or any; None if it is none."""
     order, orders = matrix.shape[0], ORDERS if kind is None else (kind,)
     sizes = {
         layout.block_size for layout in _KNOWN if order % layout.block_size == 0 and order >= 2 * layout.block_size
@@ -108,21 +99,12 @@ def _best(
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
     """A numbering that the caller knows, if it is that of a structure; None for those of solids.
 
-    Directions count displacements first, then rotations; nodes may lack some.
-
-    Raises
-    ------
-    InputError
-        If there are five directions, or rows do not fit the matrix.
+    Directions count displacements first, then rotations; nodes may lack some. None too where rows do not fit.
     """
     node, direction = np.asarray(node, dtype=np.int64), np.asarray(direction, dtype=np.int64)
     if node.shape != direction.shape or node.shape != matrix.shape[:1] or not len(node) or direction.min() < 0:
         return None  # elasticity says what is wrong
     size = int(direction.max()) + 1
-    if size == 5:
-        raise InputError(
-            f"nodes with {size} unknowns are not known: frames and shells have 6, beams in space 4, solids 2 or 3"
-        )
     node = by_first_row(node)
     if len(np.unique(node * size + direction)) < len(node):
         return None

@@ -43,7 +43,7 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int
     pairs, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
     vectors = told_by_blocks(blocks, nodes.layout)
     if ends is None:
-        good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= allowed)
+        good = np.flatnonzero(misfits(blocks, -vectors, nodes.layout) <= allowed)
     else:
         good = np.flatnonzero(np.isin(pairs @ [nodes.n, 1], ends @ [nodes.n, 1]))
     return Straight(pairs[good], vectors[good], blocks[good])
@@ -62,39 +62,36 @@ def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.fl
 
 
 def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
-    """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
+    """(m,) how far blocks are from those of members along vectors (m, dim), relative to the size of each part.
 
-    Infinite, or no number, where a block does not couple displacements to rotations, or the vector vanishes.
+    The members stretch, bend and twist like the given ones: deflections that meet the stiffness S = 12 E I / l^3 give
+    -S between deflections, S l / 2 and -S l / 2 between deflections and slopes, and S l^2 / 6 between slopes, which are
+    the rotations times the axis. Infinite where a part vanishes, displacements are not coupled to rotations, say.
     """
     moves = len(layout.displacements)
-    lever = layout.rigid_motions(vectors)[:, :moves, moves:]
-    push, turn = blocks[:, :moves, :moves], blocks[:, :moves, moves:]
-    back, twist = blocks[:, moves:, :moves], blocks[:, moves:, moves:]
-    off = [_relative(push - np.swapaxes(push, 1, 2), push), _relative(back + np.swapaxes(turn, 1, 2), turn)]
-    if max(layout.displacements) < layout.dim:  # stretching apart from bending, which may be far softer
-        along = _along(vectors)
-        across = np.eye(moves) - along
-        bending = across @ push @ across
-        off.append(_relative(push - bending - along @ push @ along, push))
-        push = bending
-    bent = -np.swapaxes(lever, 1, 2) @ push @ lever / 6
-    axis = np.stack([vectors[:, k] if k < layout.dim else np.zeros(len(vectors)) for k in layout.rotations], axis=1)
-    torsion = _along(axis)
-    off.append(_relative(turn - push @ lever / 2, turn))
-    off.append(_relative(twist - bent - torsion @ (twist - bent) @ torsion, bent))
-    return np.max(off, axis=0)
-
-
-def _along(vectors: NDArray) -> NDArray:
-    """(m, k, k) projections on vectors (m, k)."""
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit = vectors / np.where(size > 0, size, 1)
-    return np.asarray(unit[:, :, None] * unit[:, None, :])
-
-
-def _relative(off: NDArray, part: NDArray) -> NDArray[np.float64]:
-    size = np.abs(part).max(axis=(1, 2))
-    return np.asarray(np.where(size > 0, np.abs(off).max(axis=(1, 2)) / np.where(size > 0, size, 1), np.inf))
+    place = np.array([*layout.displacements, *(3 + k for k in layout.rotations)])
+    block = np.zeros((len(blocks), 6, 6))
+    block[:, place[:, None], place] = blocks
+    length = np.linalg.norm(vectors, axis=1)[:, None, None]
+    axis = np.zeros((len(blocks), 3, 1))
+    axis[:, : layout.dim, 0] = vectors
+    axis = axis / np.where(length > 0, length, 1)
+    along = axis @ axis.transpose(0, 2, 1)
+    across = np.eye(3) - along
+    bending = -across @ (block + block.transpose(0, 2, 1))[:, :3, :3] @ across / 2
+    slopes = np.cross(np.eye(3), axis.transpose(0, 2, 1)).transpose(0, 2, 1)
+    bent = bending @ slopes * length / 2
+    again = np.zeros_like(block)
+    again[:, :3, :3] = along @ block[:, :3, :3] @ along - bending
+    again[:, :3, 3:], again[:, 3:, :3] = bent, -bent.transpose(0, 2, 1)
+    again[:, 3:, 3:] = along @ block[:, 3:, 3:] @ along + slopes.transpose(0, 2, 1) @ bent * length / 3
+    again = again[:, place[:, None], place]
+    parts = (slice(moves), slice(moves, None))
+    size = [np.abs(blocks[:, a, b]).max(axis=(1, 2), initial=0) for a in parts for b in parts]
+    off = [np.abs(again[:, a, b] - blocks[:, a, b]).max(axis=(1, 2), initial=0) for a in parts for b in parts]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        misfit = np.divide(off, size).max(axis=0)
+    return np.where(np.isnan(misfit), np.inf, misfit)
 
 
 def blocks_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64], b: int) -> NDArray[np.float64]:

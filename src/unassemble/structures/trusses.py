@@ -25,9 +25,8 @@ from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
 from ..words import Reason, count_of
 from .answer import answer, covered
-from .connected import Piece
 from .least_squares import up_to_size
-from .placed import Placed, placed, without_free
+from .placed import Piece, Placed, placed, without_free
 
 
 class Bars(NamedTuple):
@@ -85,13 +84,7 @@ def truss_numbering(
 ) -> Numbering | None:
     """The usual numbering in which all blocks are those of bars, however many supports there are; None if none is.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    block_size : {2, 3}, optional
-    kind : {None, "interleaved", "by component"}
-    allowed : float
-        See :func:`bars_of`.
+    Of `block_size` 2 or 3 and a `kind` of order if these are known; what is `allowed` see :func:`bars_of`.
     """
     order = matrix.shape[0]
     sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]

@@ -11,15 +11,13 @@ from ..errors import GeometryError
 from ..nodes.shape import set_aside
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, CERTIFIED, SINGULAR, SMALL
-from .connected import Piece
 from .contradicted import contradicted
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
-from .least_squares import least_squares, up_to_size
+from .least_squares import least_squares, unnoticed_in, up_to_size
 from .nodes import Nodes
-from .placed import Placed, placed, without_free
+from .placed import Piece, Placed, placed, without_free
 from .straight import Straight
-from .unnoticed import unnoticed_in
 
 
 def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIED) -> tuple[Placed, NDArray[np.bool_]]:

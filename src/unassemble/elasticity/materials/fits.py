@@ -15,11 +15,9 @@ from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
 from ...linalg import threads
 from ...tolerances import CERTIFIED, LITTLE, ROUNDED, SINGULAR
-from .entries import Entries, Pairs
-from .model import Model, added, claims
+from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
-_FEW = 0.3  # of the candidates: how many may be no cells
 _LARGEST = 50_000_000  # numbers in a least-squares problem
 
 
@@ -43,15 +41,13 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
         if rule is None:
             return
         found, entries = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
-        if np.isnan(found).any():
-            return
         lame.append(found)
     if not simple:
         yield rich, np.vstack(lame), entries.largest
     for model in simple:
         if ratio is not None:
-            mu, rest = one_material(model, entries, ratio)
-            yield blocks, np.vstack([mu[:, None] * [ratio, 1], *lame]), rest.largest
+            coefficients, rest = _one_material(model, entries, ratio)
+            yield blocks, np.vstack([coefficients, *lame]), rest.largest
         pairs = model.kind.nodes * (model.kind.nodes - 1)
         if len(model.cells) * pairs * model.kind.dim**2 <= _LARGEST:
             coefficients, rest = _least_squares(model, entries)
@@ -122,42 +118,24 @@ def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size
     return found
 
 
-def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[np.float64], Entries]:
-    """(m,) shear moduli of cells with (ratio mu, mu), the same mu or zero, and what they leave of the entries.
-
-    Candidates that are no cells have to be few. They overfill all entries that they contribute to; among candidates of
-    which that is true, least squares tell which are cells.
-    """
-    pairs = Pairs.of(model.cells, entries)
-    full = model.assembled(pairs, entries, np.ones((len(model.cells), 1)) * [ratio, 1])
+def _one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[np.float64], Entries]:
+    """(m, 2) coefficients (ratio mu, mu) of cells, the same for all, and what they leave of the entries."""
+    unit = np.ones((len(model.cells), 1)) * [ratio, 1]
+    full = model.assembled(Pairs.of(model.cells, entries), entries, unit)
     square = (full * full).sum(axis=(1, 2))
     weighty = square > ROUNDED * square.max(initial=0)
-    if not weighty.any():
-        return np.zeros(len(model.cells)), entries
     # Between the entries and those assembled, whatever a few candidates too many add.
-    mu = float(np.median((full * entries.value).sum(axis=(1, 2))[weighty] / square[weighty]))
-    rest = replace(entries, value=entries.value - mu * full)
-    poor = np.abs(rest.value).max(axis=(1, 2)) > CERTIFIED * entries.size
-    suspects = np.flatnonzero((poor[pairs.place] | ~pairs.there).all(axis=1))
-    moduli = np.full(len(model.cells), mu)
-    if mu == 0 or not 0 < len(suspects) < _FEW * len(model.cells):
-        return moduli, rest
-    doubted = replace(model, cells=model.cells[suspects])
-    lame = np.full((len(suspects), 1), mu) * [ratio, 1]
-    without = replace(rest, value=rest.value + doubted.assembled(pairs.at(suspects), entries, lame))
-    told, _ = _least_squares(doubted, without, ratio)
-    no_cell = told[:, 1] < 0.5 * mu if mu > 0 else told[:, 1] > 0.5 * mu
-    moduli[suspects[no_cell]] = 0
-    again = doubted.assembled(pairs.at(suspects), entries, lame * ~no_cell[:, None])
-    return moduli, replace(rest, value=without.value - again)
+    each = (full * entries.value).sum(axis=(1, 2))[weighty] / square[weighty]
+    mu = float(np.median(each)) if len(each) else 0.0
+    return mu * unit, replace(entries, value=entries.value - mu * full)
 
 
-def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -> tuple[NDArray[np.float64], Entries]:
+def _least_squares(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entries]:
     """(m, 2) coefficients that fit entries best, zero where none shows, and what they leave of the entries.
 
     Neighbours share most of their entries, and candidates that carry no material get zeros.
     """
-    design = model.operator(Pairs.of(model.cells, entries), entries, ratio)
+    design = model.operator(Pairs.of(model.cells, entries), entries)
     target = (entries.value / entries.size[:, None, None]).ravel()
     weight = np.sqrt(np.asarray(design.power(2).sum(axis=0)).ravel())
     seen = weight > 0
@@ -167,5 +145,4 @@ def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -
         found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
     coefficients[seen] = found / weight[seen]
     left = (target - design @ coefficients).reshape(entries.value.shape) * entries.size[:, None, None]
-    lame = coefficients.reshape(-1, 2) if ratio is None else coefficients[:, None] * [ratio, 1]
-    return lame, replace(entries, value=left)
+    return coefficients.reshape(-1, 2), replace(entries, value=left)

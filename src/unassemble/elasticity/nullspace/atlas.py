@@ -94,20 +94,14 @@ def _joined(charts: list[Fields], n: int) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def _lowest(form: NDArray, count: int) -> NDArray:
-    """Eigenvectors of the least eigenvalues of a positive semidefinite form; of large ones by inverse iteration."""
-    n = len(form)
-    if n <= 4 * count:
-        values, v = scipy.linalg.eigh(form)
-        values = values[:count]
-    else:
-        factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
-        x = np.random.default_rng(0).standard_normal((n, count))
-        for _ in range(4):
-            x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
-        values, v = scipy.linalg.eigh(x.T @ form @ x)
-        v = x @ v
+    """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration."""
+    factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(len(form)))
+    x = np.random.default_rng(0).standard_normal((len(form), count))
+    for _ in range(4):
+        x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
+    values, v = scipy.linalg.eigh(x.T @ form @ x)
     # The stiff rest says nothing but where it begins.
-    return np.asarray(v[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
+    return np.asarray(x @ v[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
 
 
 @dataclass(frozen=True, eq=False)

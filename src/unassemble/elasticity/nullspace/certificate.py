@@ -26,8 +26,6 @@ def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.f
         (np.abs(nodal.data).max(axis=(1, 2)), nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n)
     ) @ (~known).astype(float)
     usable = valid & (blind == 0)[:, None, None]
-    if not usable.any():
-        return np.empty(0)
     off = nodal.node < nodal.indices
     length = np.linalg.norm(points[nodal.node[off]] - points[nodal.indices[off]], axis=1)
     mean = float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
