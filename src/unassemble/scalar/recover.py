@@ -36,22 +36,11 @@ def recover_scalar(
     options: ScalarOptions,
     squared_lengths: NDArray | None = None,
 ) -> PlanarMesh:
-    """The mesh of a checked scalar matrix, of as few digits as its entries seem to have, or else of exact ones.
+    """The mesh of a checked scalar matrix whose entries have errors of known size, or those of assembly.
 
     `squared_lengths` (e,): of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
-    task = Task(options, placement, Noise.known(stored, options.noise), squared_lengths)
-    found = _recovered(stored, clock, task)
-    searched = "faces" in clock.timings  # for cells
-    if searched and found.status == "uncertified" and task.noise and task.noise.digits:
-        # Few digits need not be rounded ones, and errors that entries do not have hide what their cells are.
-        exact = _recovered(stored, clock, replace(task, noise=None))
-        return exact if exact.status != "uncertified" else found
-    return found
-
-
-def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
-    """The mesh of a matrix whose entries have errors of known size, or those of assembly."""
+    task = Task(options, placement, Noise.known(stored, options.noise))
     free_scale = task.scale is None
     with clock("topology"):
         topology = stored.surfaces
@@ -61,8 +50,8 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     topology = solved.topology
     with clock("place"):
         sizes = None
-        if task.squared_lengths is not None:  # mean edge length of each piece; over all edges 1
-            lengths = [np.sqrt(task.squared_lengths[piece.edge_rows]) for piece in topology.pieces]
+        if squared_lengths is not None:  # mean edge length of each piece; over all edges 1
+            lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
             sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
         z, remarks = [mesh.z for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
         placed, origins, notes = task.placement.placed(topology, z, remarks, sizes)

@@ -29,8 +29,6 @@ class Task:
     options: ScalarOptions
     placement: Placement
     noise: Noise | None  # errors of the entries, where they are not those of assembly
-    # (e,) of the edges of the matrix, where they are known from elsewhere
-    squared_lengths: NDArray[np.float64] | None = None
 
     @property
     def scale(self) -> float | None:
