@@ -39,17 +39,14 @@ def recover_conforming(
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
     best: ConformingMesh | None = None
-    small = stored.n <= SEARCHED_ROWS
-    remaining, even = iter(shown), False
-    while True:
-        if best is not None and best.certified and not (small or even):
-            break
+    remaining, even, small = iter(shown), False, stored.n <= SEARCHED_ROWS
+    while best is None or not best.certified or ((small or even) and best.uniqueness != "proved"):
         with clock("cells"):
             cells = next(remaining, None)
         if cells is None:
             break
+        even = cells.even
         try:
-            even = cells.even
             mesh = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
@@ -58,8 +55,6 @@ def recover_conforming(
             return _ambiguous(best, mesh)
         if best is None or (not best.certified and (mesh.certified or mesh.backward_error < best.backward_error)):
             best = mesh
-        if best.uniqueness == "proved":
-            break
     if best is None:
         raise failure
     if best.uniqueness == "searched" and not small:
@@ -70,13 +65,13 @@ def recover_conforming(
 
 def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     """A mesh beside which another fits."""
-    cells = [{tuple(cell) for some in mesh.cells.values() for cell in some.tolist()} for mesh in (one, other)]
-    rows = [{frozenset(cell): cell for cell in some} for some in cells]
+    rows = [
+        {frozenset(cell): tuple(cell) for some in mesh.cells.values() for cell in some.tolist()}
+        for mesh in (one, other)
+    ]
     differ = [
         tuple(mine[key] for key in sorted(mine, key=sorted) if key not in theirs) for mine, theirs in (rows, rows[::-1])
     ]
-    if not any(differ):  # the same sets in other orders
-        differ = [tuple(sorted(mine)) for mine in cells]
     reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
     return replace(
         one,
