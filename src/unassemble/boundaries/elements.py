@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..conforming.affine import expected
 from ..conforming.fit import Fitted, by_rule, corner_positions
-from ..conforming.joined import JoinedParts
 from ..conforming.parts import Part, parts_of
-from ..conforming.recover import shown_cells
+from ..conforming.recover import JoinedParts, shown_cells
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions

@@ -1,14 +1,20 @@
 """A scalar matrix of any planar element on one page: cells, positions, place, certificate."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative
+from ..certify import Certificate
+from ..certify_elements import certify_elements
 from ..clock import Clock
+from ..elements.surface import boundary_loops
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -22,8 +28,7 @@ from ..topology import Topology, local_numbering
 from ..topology.keys import contains, pair_keys
 from ..words import count_of, sentences
 from .fit import Fitted, deviations_of, fitted
-from .joined import JoinedParts
-from .parts import Part, parts_of
+from .parts import Part, parts_of, reversal
 from .roles import Cells, ordered_cells
 from .sets import node_sets
 
@@ -217,3 +222,63 @@ def _bare(stored: OperatorMatrix, fits: Sequence[Fitted]) -> str:
         return ""
     i, j = stored.edges[bare[0]]
     return f"the mesh gives the matrix back, but the stored zero of rows {i} and {j} belongs to no cell"
+
+
+class JoinedParts:
+    """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
+
+    def __init__(self, topology: Topology, fits: Sequence[Fitted], placement: Placement):
+        """Parts are the pieces of the topology."""
+        n = topology.n_vertices
+        self.points = np.full((n, 2), np.nan)  # of each about its origin
+        self.component = topology.component
+        self.blocks: dict[str, NDArray[np.int64]] = {}
+        self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
+        self._topology, self._fits, self._tensor = topology, fits, placement.tensor
+        self._stretch = placement.stretch
+        nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
+        self.placed, self.origins, self.notes = placement.placed(topology, nodes, remarks)
+        for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
+            part, z = fits[label].part, self.placed[label]
+            self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
+            a, b, c = z[part.piece.triangles].T
+            mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
+            for kind, cells in part.blocks.items():
+                own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
+                piece, name = np.full(len(own), label), kind.name
+                self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
+                self._piece[name] = np.concatenate([piece, self._piece.get(name, piece[:0])])
+
+        shift = self.origins[self.component]
+        self.written = self.points + np.column_stack([shift.real, shift.imag])
+
+    def held(self, matrix: OperatorMatrix, points: NDArray) -> Certificate:
+        """The mesh with these points against the matrix."""
+        if self._tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
+            z = self._tensor.to_laplacian(points @ [1, 1j])
+            points = np.column_stack([z.real, z.imag])
+        scale = np.array([fit.scale for fit in self._fits])
+        factors = {name: scale[piece] for name, piece in self._piece.items()}
+        rules = {name: rule for fit in self._fits for name, rule in fit.rule.items()}
+        return certify_elements(matrix.edges, matrix.entries, points, self.blocks, factors, rules)
+
+    def fields(self) -> dict[str, Any]:
+        """What results say of the mesh, under the names that they have for it."""
+        fields: dict[str, Any] = {}
+        for name, cells in self.blocks.items():
+            corners = 3 if name.startswith("triangle") else 4
+            fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])
+            if cells.shape[1] > corners:
+                fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
+        boundary, offsets = boundary_loops(self.blocks)
+        return fields | {
+            "points": self.written,
+            "boundary": boundary,
+            "boundary_offsets": offsets,
+            "component": self.component,
+            "hinges": self._topology.hinges,
+            "scale": np.array([fit.scale for fit in self._fits]) / self._stretch,
+            "n_holes": sum(fit.part.n_holes for fit in self._fits),
+            "quadrature": ", ".join(dict.fromkeys(rule for fit in self._fits for rule in fit.rule.values())),
+            "straight": all(fit.straight for fit in self._fits),
+        }
