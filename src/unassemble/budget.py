@@ -27,15 +27,6 @@ class Budget:
     A sparse product costs its number of stored entries, a factorisation the entries of its factors times their mean
     number in a column, a step of plain Python about a hundred. Nothing is measured: the same search spends the same
     on every machine.
-
-    Examples
-    --------
-    >>> budget = Budget(100)
-    >>> budget.take(60), budget.take(60), budget.spent
-    (True, False, 60.0)
-    >>> half = budget.share(0.5)
-    >>> half.take(20), half.take(1), budget.left
-    (True, False, 20.0)
     """
 
     work: float  # units in all; infinite for a search that its caller bounds otherwise

@@ -64,23 +64,10 @@ def certify(
     tensor: tuple[float, float, float] | None = None,
     terms: Terms | None = None,
 ) -> Certificate:
-    """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries.
+    """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries; with further terms all.
 
-    With further terms the diagonal as well.
-
-    Parameters
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j of the matrix.
-    entries : (e,) float64
-        A_ij.
-    points : (n, 2) float64
-    triangles : (m, 3) int64
-    factor : (m,) float64
-        The factor c of each triangle's piece.
-    tensor : (kxx, kxy, kyy), optional
-        K; the identity by default.
-    terms : Terms, optional
+    `edges` (e, 2): pairs i < j of the matrix; `entries` (e,): A_ij; `points` (n, 2); `triangles` (m, 3); `factor` (m,):
+    the factor c of each triangle's piece; `tensor`: kxx, kxy and kyy of K, the identity by default.
     """
     kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
     corners = [np.ascontiguousarray(column) for column in triangles.T]

@@ -46,30 +46,11 @@ def certify_elements(
 ) -> Certificate:
     """Re-assemble factor * Laplacian with isoparametric elements and compare off-diagonal entries.
 
-    With further terms the diagonal as well.
-
-    Parameters
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j of the matrix.
-    entries : (e,) float64
-        A_ij.
-    points : (n, 2) float64
-    blocks : mapping of str to (m, k) int64
-        Cells by meshio's names and in its order.
-    factors : mapping of str to (m,) float64
-        The factor c of each cell's piece.
-    rules : mapping of str to str
-        Quadrature: ``"n x n Gauss"`` for quadrilaterals; ``"degree 2"``, ``"degree 4"`` or ``"degree 5"`` for
-        triangles.
-    terms : Terms, optional
-        Not lumped.
-
-    Returns
-    -------
-    Certificate
-        Cells are flipped that are not right side out in each corner and at each point of the quadrature; they count
-        through all kinds.
+    With further terms, which are not lumped, the diagonal as well. `edges` (e, 2): pairs i < j of the matrix; `entries`
+    (e,): A_ij; `points` (n, 2); `blocks`: cells (m, k) by meshio's names and in its order; `factors` (m,) of each: the
+    c of each cell's piece; `rules`: quadrature, ``"n x n Gauss"`` for quadrilaterals, ``"degree 2"``, ``"degree 4"`` or
+    ``"degree 5"`` for triangles. Cells are flipped that are not right side out in each corner and at each point of the
+    quadrature; they count through all kinds.
     """
     n = len(points)
     keys, values, flipped, first = [], [], [], 0

@@ -15,7 +15,7 @@ from .errors import InputError
 from .files import made_folder, whole_file
 from .pipeline import recover
 from .plot import plot_comparison
-from .recovery import Recovery
+from .recovery import PlanarMesh, Recovery
 from .report import write_report
 from .summary import summary
 
@@ -49,10 +49,10 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
         recovery.save(folder / f"{specimen.name}.vtu")
         write_report(recovery, folder / f"{specimen.name}.json")
         picture = folder / f"{specimen.name}.png"
-        if recovery.vector_valued:
-            recovery.plot(picture)
-        else:
+        if isinstance(recovery, PlanarMesh):
             plot_comparison(specimen.points, recovery, picture)
+        else:
+            recovery.plot(picture)
         echo(summary(recovery))
         drawn = "recovered structure" if recovery.vector_valued else "true and recovered mesh"
         echo(f"\nin {folder}: {specimen.name}.mtx, .vtu, .json and .png ({drawn})\n")

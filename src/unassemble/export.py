@@ -38,12 +38,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     as such, see :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says. An
     old file is replaced.
 
-    Raises
-    ------
-    OutputError
-        If the file cannot be written; an old one is then as it was.
-    FormatError
-        If the format cannot hold this mesh.
+    Raises OutputError if the file cannot be written, and an old one is then as it was; FormatError if the format cannot
+    hold this mesh.
     """
     suffix, mesh_format = format_of(path)
     _check_content(recovery, suffix, mesh_format)

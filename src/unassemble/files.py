@@ -76,6 +76,4 @@ def check_plot(path: str | os.PathLike[str]) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    if isinstance(error, OSError) and error.errno is None and "written" in str(error):  # so says numpy
-        return "it could not be written whole; the disk may be full"
     return (getattr(error, "strerror", None) or str(error)).lower()

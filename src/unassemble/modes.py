@@ -34,20 +34,10 @@ def rigid_body_modes(
 ) -> NDArray[np.float64]:
     """Near-null space of an elasticity matrix or that of a structure, in the layout that PyAMG expects.
 
-    Parameters
-    ----------
-    points : (n, d) float64
-        NaN rows get what they have without moving: translations, and rotations of the node itself.
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known, and gets zeros.
-    layout : Layout, optional
-        Of structures whose nodes have rotations, too.
-
-    Returns
-    -------
-    (N, 3) or (N, 6) float64
-        Translations, then rotations, row by row of the matrix. Rotations are about the centroid, divided by the radius
-        of gyration, so that none swamps another.
+    `points` (n, d): rows of NaN get what they have without moving, translations, and rotations of the node itself;
+    `node_of_row`, `direction_of_row` (N,): a direction of -1 is not known, and gets zeros; `layout`: of structures
+    whose nodes have rotations, too. Returns (N, 3) or (N, 6), row by row of the matrix: translations, then rotations
+    about the centroid, divided by the radius of gyration, so that none swamps another.
     """
     layout = layout or SOLIDS[points.shape[1]]
     known = np.asarray(np.isfinite(points).all(axis=1))

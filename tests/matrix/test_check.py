@@ -242,11 +242,6 @@ def test_drop_zeros_out_of_range(options: dict[str, float], refused) -> None:
     refused(InputError, "drop_zeros", check_matrix, PATH, **options)
 
 
-@pytest.mark.parametrize("noise", [-1.0, np.nan, np.inf])
-def test_noise_out_of_range(noise: float, refused) -> None:
-    refused(InputError, "noise", check_matrix, PATH, noise=noise)
-
-
 def test_drop_zeros_forgets_and_counts() -> None:
     A = with_zero(1e-14)
     assert len(check_matrix(A).edges) == 3

@@ -20,7 +20,7 @@ from .rim import Rim
 
 # Weights of the prior, one after the other, and once more.
 _FADING = (0.1, 0.01, 1e-3, 0.0)
-_LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
+LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
 SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
@@ -42,7 +42,8 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
 def nearest_conformal(problem: WholeEntries, rim: Rim) -> NDArray[np.complex128]:
     """(n,) the conformal map of entries that are whole or guessed; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    return _conformal(problem, guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given)))
+    c, _ = estimate_scale(problem.piece, given)
+    return _conformal(problem, guessed(problem.piece, given, rim.given, c))
 
 
 def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], c: float) -> NDArray[np.float64]:
@@ -64,7 +65,7 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
     first, second, third = ((mu, 3) for mu in _FADING[:-1])
-    large = problem.piece.n_vertices >= _LARGE
+    large = problem.piece.n_vertices >= LARGE
     for turn in ([first, second], [third]) if large else ([first], [second], [third]):
         z = fit_near(problem, fit.z, fit.scale, rim.whole, band, turn)
         fit = problem.fit(z, fit.scale, rim.whole, turn[-1][0], newton)

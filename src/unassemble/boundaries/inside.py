@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
-from .first import first_fits, nearest_conformal
+from .first import LARGE, first_fits, nearest_conformal
 from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .judge import determined, unknowns
 from .lengths import fit_lengths
@@ -198,5 +198,9 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         near = np.zeros(piece.n_vertices, dtype=bool)
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
+        if piece.n_vertices < LARGE and misfit[grown.whole].max() < 1e-3:  # these come to the end that patches do not
+            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+            if fit.misfit <= EXACT:
+                return fit, grown
     fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
     return (fit, grown) if fit.misfit <= EXACT else (core, rim)

@@ -12,8 +12,9 @@ from ..planar.piece import PieceMesh
 from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
 from ..topology.keys import contains, distinct, pair_keys
-from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
+from .doubt import Attempt, Outcome, Solved, unexplained
 from .judge.labelling import Labelling, add_differing_factors
+from .judge.within_errors import misfits
 from .search.options import SEARCH
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
@@ -101,7 +102,7 @@ def _labelled(
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
     before = _Part([(piece, attempt(piece)) for piece in own])
-    misfit = misfits_of(matrix, before.pieces)
+    misfit = misfits(matrix.n, matrix.edges, -matrix.entries, before.pieces)
     if placed := [(piece, mesh) for piece, mesh in before.pieces if isinstance(mesh, PieceMesh)]:
         add_differing_factors(placed, misfit, scale)
     size = float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
@@ -112,10 +113,6 @@ def _labelled(
         require_planar(n, numbering.edges)
     if own:
         return before
-    if labelling is None:
-        raise GeometryError(
-            f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"
-        )
     raise GeometryError(
         f"of the meshes tried on the graph of the matrix, which is planar ({n} rows, {e} entries above the diagonal), "
         "none has its entries: they may belong to no mesh, as those of a network, or lack zeros that should be stored"

@@ -38,14 +38,14 @@ def in_doubt(
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    misfit = misfits_of(matrix, solved)
+    misfit = misfits(matrix.n, matrix.edges, -matrix.entries, solved)
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfit[rest]
     wrong = misfit > ALIKE
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
     solved = [(piece, _shortly_polished(matrix, piece, mesh, scale, small_steps=bool(noise))) for piece, mesh in solved]
-    if _like_noise(misfits_of(matrix, solved)[rest], matrix.n):
+    if _like_noise(misfits(matrix.n, matrix.edges, -matrix.entries, solved)[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
 
@@ -70,12 +70,6 @@ def _shortly_polished(
     except SolverError as error:
         return error
     return PieceMesh(found.z, found.scale)
-
-
-def misfits_of(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
-    """(e,) of pieces that have positions, as :func:`.judge.within_errors.misfits`."""
-    placed = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
-    return misfits(matrix.n, matrix.edges, -matrix.entries, placed)
 
 
 def unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:

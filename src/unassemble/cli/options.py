@@ -63,8 +63,6 @@ class Numbers(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Any, ...]:
         """Read a word."""
-        if isinstance(value, tuple):
-            return value
         words = value.split(",")
         try:
             numbers = tuple(int(w) if part == "ROW" else float(w) for part, w in zip(self._parts, words, strict=False))

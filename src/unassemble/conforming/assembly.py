@@ -31,7 +31,7 @@ _CELLS = AT_ONCE // 1024  # few enough for the cache: a cell has about a hundred
 class Entries:
     """Weights w = -K of all pairs of a part, for positions of its nodes, or of its corners where it is straight.
 
-    A :class:`~unassemble.planar.problem.Model`.
+    A :class:`~unassemble.planar.polish.Model`.
 
     `straight`: whether positions are those of corners, from which all nodes follow.
     """

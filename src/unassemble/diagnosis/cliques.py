@@ -49,11 +49,6 @@ class Cells:
     around: float
     twins: float  # share of rows with the neighbours of another row, and coupled to it: several unknowns of one node
 
-    @property
-    def tetrahedral(self) -> bool:
-        """Whether pairs lie in cells of four, as many around each as in a mesh in space."""
-        return mostly(self.in_fours) and self.around <= 3  # products of matrices, and dense graphs, have 5 and more
-
 
 def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
     """Look at some pairs i < j of a graph, of which there is at least one, all near to each other."""

@@ -58,7 +58,8 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis | None:
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, sums)
-        if not (often(cells.often) or several) and cells.tetrahedral:
+        if not (often(cells.often) or several) and mostly(cells.in_fours) and cells.around <= 3:
+            # As many around each as in a mesh in space; products of matrices, and dense graphs, have 5 and more.
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, sums)
         if not (often(cells.in_fours) or several) and mostly(cells.in_threes) and len(edges) >= 2.5 * matrix.n:

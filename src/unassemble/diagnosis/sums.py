@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..tolerances import MOST, ROUNDED, SMALL
+from ..tolerances import MOST, SMALL
 from ..words import count_of
 from .kinds import KEEP_ALL, WITHOUT_MASS
 
@@ -90,8 +90,6 @@ def further_terms(matrix: OperatorMatrix) -> str:
         return ", plus a diagonal"
     if sums.zero.any() and not sums.sign:
         return ", plus a diagonal or without some unknowns"
-    if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
-        return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"
     if sums.sign:
         return ", plus a diagonal or a mass matrix, as of a reaction"
     scaled = (matrix.diagonal > 0).all() or (matrix.diagonal < 0).all()  # squares of factors keep signs

@@ -106,7 +106,7 @@ def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
 def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
     """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
     try:
-        scale = estimate_scale(piece, weights)
+        scale = estimate_scale(piece, weights)[0]
     except GeometryError:
         scale = np.nan
     sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)
@@ -123,8 +123,6 @@ def surface_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     except RecoveryError:
         return {}
     kinds = [kind_text(*kind) for kind in zip(mesh.euler, mesh.orientable, mesh.loops, strict=True)]
-    if not (~mesh.orientable | (mesh.euler + mesh.loops < 2) | (mesh.loops == 0)).any():
-        return {}
     return {
         "surface": "; ".join(kinds[:3]) + ("; ..." if len(kinds) > 3 else ""),
         "n_triangles": len(mesh.triangles),

@@ -20,20 +20,9 @@ _NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do 
 def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> Inspection:
     """Describe a matrix; quick, since nothing is solved: cells are those that recovery begins with.
 
-    Parameters
-    ----------
-    A : OperatorMatrix, sparse matrix or array, ndarray, path, or "-"
-    variable : str, optional
-        Name of the variable in a ``.mat`` file.
-    drop_zeros : float, optional
-        Forget stored entries of at most this, as in :func:`unassemble.recover`.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be read as a matrix.
-    MatrixError
-        If the matrix lacks what every operator has: square, symmetric, finite, ...
+    `A`: an OperatorMatrix, a sparse matrix or array, an ndarray, a path, or ``"-"``; `variable`: the name of the
+    variable in a ``.mat`` file; `drop_zeros`: forget stored entries of at most this, as in :func:`unassemble.recover`.
+    Raises InputError if a file cannot be read as a matrix; MatrixError if the matrix lacks what every operator has.
 
     Examples
     --------

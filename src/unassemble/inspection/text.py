@@ -40,7 +40,11 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
         lines += [("element", f"{facts.element}, {ELEMENTS[facts.element]}"), ("mesh", f"{mesh_text(facts)}, {sides}")]
         lines += holes
     elif not facts.obstacle:
-        lines += [("mesh", _mesh(facts)), ("cells", _cells(facts)), *holes, ("scale c", _scale(facts))]
+        left_over = {"edge": facts.n_bare_edges, "row": facts.n_undetermined}
+        more = [f"; {count_of(count, one)} of no cell" for one, count in left_over.items() if count]
+        faces, sides = count_of(facts.n_faces, "face"), count_of(facts.n_boundary_edges, "boundary edge")
+        mesh = "".join([f"{mesh_text(facts)}, {faces} with the outside and the holes, {sides}", *more])
+        lines += [("mesh", mesh), ("cells", _cells(facts)), *holes, ("scale c", _scale(facts))]
     lines.append(("operator", facts.operator))
     lines += [("evidence", one) for one in facts.evidence]
     lines.append(("recoverable", facts.recoverable))
@@ -52,8 +56,6 @@ def _planar(facts: Inspection) -> str:
         return "yes"
     if facts.element:
         return "no, but rows that are all coupled to each other form cells"
-    if facts.kind == "mass":
-        return "not looked for, since the matrix has no shape"
     return "not looked for, since the rows form nodes of several unknowns" if facts.n_nodes else "no"
 
 
@@ -84,13 +86,6 @@ def _cells(facts: Inspection) -> str:
         gone.append(f"{count_of(facts.n_vanished_sides, 'side')} of the boundary, facing right angles")
     vanished = f"; no entry on {' and on '.join(gone)}" if gone else ""
     return f"read from the entries, since the graph does not settle them{vanished}; recovery begins with these"
-
-
-def _mesh(facts: Inspection) -> str:
-    faces, sides = count_of(facts.n_faces, "face"), count_of(facts.n_boundary_edges, "boundary edge")
-    left_over = {"edge": facts.n_bare_edges, "row": facts.n_undetermined}
-    more = [f"; {count_of(count, one)} of no cell" for one, count in left_over.items() if count]
-    return "".join([f"{mesh_text(facts)}, {faces} with the outside and the holes, {sides}", *more])
 
 
 def _scale(facts: Inspection) -> str:

@@ -38,7 +38,12 @@ class _Phase(IntEnum):
 @cache
 def _library() -> ctypes.CDLL:
     # A handle of our own: ctypes keeps argument types per handle, and pypardiso's declares pointers to reals.
-    library = ctypes.CDLL(_installed() or _searched())
+    path = _installed()
+    if path is None:
+        from pypardiso import PyPardisoSolver
+
+        path = str(PyPardisoSolver().libmkl._name)  # it looks through the whole environment
+    library = ctypes.CDLL(path)
     if "MKL_CBWR" not in os.environ:
         # The same bits on every run: sums of several threads are otherwise added in the order in which they come in.
         library.MKL_CBWR_Set(2)  # MKL_CBWR_AUTO: the fastest code for this processor that is reproducible
@@ -53,13 +58,6 @@ def _installed() -> str | None:
         return None
     paths = (str(file.locate()) for file in files if re.fullmatch(r"(lib)?mkl_rt\b.*(so|dylib|dll)[.\d]*", file.name))
     return next(filter(os.path.exists, paths), None)
-
-
-def _searched() -> str:
-    """Path of the library that ``pypardiso`` finds; it looks through the whole environment."""
-    from pypardiso import PyPardisoSolver
-
-    return str(PyPardisoSolver().libmkl._name)
 
 
 def available() -> bool:

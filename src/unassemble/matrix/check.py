@@ -18,42 +18,20 @@ from .symmetry import from_columns, symmetric_entries, triangles
 def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None = None) -> OperatorMatrix:
     """Check that a matrix has what every supported operator has, and store it as a weighted graph.
 
-    Parameters
-    ----------
-    A : (n, n) scipy sparse matrix or array, or array_like
-        Explicit zeros are structure (``drop_zeros=0`` forgets them); see `canonical`.
-    drop_zeros : float, optional
-        Forget stored off-diagonal entries of at most this times the largest off-diagonal entry of their row
-        and of their transpose's; at least 0 and below 1.
-    noise : float, optional
-        Standard deviation of independent errors in the entries: both triangles may then differ by ten times as much.
+    `A` (n, n): sparse, or array_like; explicit zeros are structure, see `canonical`. `drop_zeros`: forget stored
+    off-diagonal entries of at most this, 0 or more and below 1, times the largest off-diagonal entry of their row and
+    of their transpose's. `noise`: standard deviation of independent errors in the entries; both triangles may then
+    differ by ten times as much. Returns the mean of both triangles, of complex matrices of their real part; its
+    ``warnings`` tell what was changed.
 
-    Returns
-    -------
-    OperatorMatrix
-        The mean of both triangles, of complex matrices of their real part; its ``warnings`` tell what was changed.
-
-    Raises
-    ------
-    InputError
-        If `drop_zeros` or `noise` is out of range.
-    MatrixError
-        If the matrix is not square, empty, without numbers, not finite, diagonal, dense, not symmetric, or has far
-        more rows than entries, entries whose products overflow, or connected rows out of all proportion. Both
-        triangles may differ by 1e-10 of the largest off-diagonal entry of the two rows, or by a convection: an
-        antisymmetric part whose rows add up to zero.
-
-    Examples
-    --------
-    >>> matrix = check_matrix([[2.0, -1.0], [-1.0, 2.0]])
-    >>> matrix.n, matrix.edges.tolist(), matrix.entries.tolist()
-    (2, [[0, 1]], [-1.0])
+    Raises InputError if `drop_zeros` is out of range; MatrixError if the matrix is not square, empty,
+    without numbers, not finite, diagonal, dense, not symmetric, or has far more rows than entries, entries whose
+    products overflow, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the largest
+    off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
     """
     number = isinstance(drop_zeros, Real) and not isinstance(drop_zeros, bool)
     if drop_zeros is not None and not (number and 0 <= drop_zeros < 1):
         raise InputError(f"`drop_zeros` is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
-    if noise is not None and not (noise >= 0 and np.isfinite(noise)):
-        raise InputError(f"`noise` is a standard deviation, finite and not negative, not {noise}")
     csr, warnings = _real(as_csr(A))
     pairs, n, diagonal = triangles(csr), csr.shape[0], csr.diagonal()
     if not len(pairs.edges):

@@ -39,7 +39,8 @@ class Digits:
         if len(told) < 2:  # one may be a factor that somebody chose
             return None
         if _are_binary(size, _SINGLE).all() and _need_more(_are_binary(told, _NEARLY)):
-            return cls("single precision", _last_bit(np.abs(values), _SINGLE))
+            last_bit = np.ldexp(1.0, np.frexp(values)[1] - _SINGLE)
+            return cls("single precision", np.where(values != 0, last_bit, 0.0))
         digits = next((d for d in _DIGITS if _have(sample, d).all() and _have(size, d).all()), None)
         return None if digits is None else cls._decimal(np.abs(values), size, told, digits)
 
@@ -84,7 +85,3 @@ def _are_multiples(size: NDArray, exponent: NDArray) -> NDArray[np.bool_]:
 def _are_binary(size: NDArray, digits: int) -> NDArray[np.bool_]:
     scaled = np.ldexp(np.frexp(size)[0], digits)
     return np.asarray(scaled == np.rint(scaled))
-
-
-def _last_bit(size: NDArray, digits: int) -> NDArray[np.float64]:
-    return np.where(size > 0, np.ldexp(1.0, np.frexp(size)[1] - digits), 0.0)

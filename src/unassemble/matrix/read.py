@@ -45,12 +45,8 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
     name of one in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``. The result is of dtype float64, or complex128 or
     bool where the file says so, and neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
 
-    Raises
-    ------
-    MatrixFileError
-        If the file cannot be read as a matrix.
-    MatrixError
-        If it holds a pattern without numbers, or far more rows than entries.
+    Raises MatrixFileError if the file cannot be read as a matrix; MatrixError if it holds a pattern without numbers, or
+    far more rows than entries.
     """
     with _opened(source) as (stream, name):
         try:

@@ -76,9 +76,8 @@ def symmetric_entries(
     """
     warnings: tuple[str, ...] = ()
     if pairs.one_sided:
-        count, its = ("1 entry is", "its") if pairs.one_sided == 1 else (f"{pairs.one_sided} entries are", "their")
-        added = f"{its} place on the other was added to the structure"
-        warnings = (f"{count} stored on one side of the diagonal only; {added}",)
+        some = count_of(pairs.one_sided, "entry is", "entries are")
+        warnings = (f"{some} stored on one side of the diagonal only; places on the other were added to the structure",)
     differing = np.flatnonzero(pairs.upper != pairs.lower)
     if not len(differing):
         return pairs.upper, 0.0, warnings

@@ -2,7 +2,7 @@
 
 from .conformal import ConformalOptions, conformal_map, estimate_scale
 from .cotangent import edge_weights, weight_gradient
-from .deviations import coordinate_covariances
+from .deviations import covariances
 from .frame import canonical_frame, collinear, fit_similarity
 from .hinges import join
 from .normal import WeightJacobian
@@ -22,8 +22,8 @@ __all__ = [
     "collapsed",
     "collinear",
     "conformal_map",
-    "coordinate_covariances",
     "count_flipped",
+    "covariances",
     "edge_weights",
     "estimate_scale",
     "fit_similarity",

@@ -53,19 +53,13 @@ class ConformalMap:
     converged: bool  # whether position changes fell to the level that the conditioning allows
 
 
-def estimate_scale(piece: Piece, weights: NDArray) -> float:
-    """A guess of c, right to some ten per cent on meshes of decent triangles.
+def estimate_scale(piece: Piece, weights: NDArray) -> tuple[float, float | None]:
+    """A guess of c, and what is probably right to all digits: what many triangles say, as on grids, or 1.
 
     The halves g = cot / 2 of a triangle's three weights satisfy g1 g2 + g2 g3 + g3 g1 = 1/4. Sharing
-    each weight equally between its two triangles gives one value of c from each triangle; the median counts.
-
-    Raises GeometryError if the weights add up to zero.
+    each weight equally between its two triangles gives one value of c from each triangle; the median is right to some
+    ten per cent on meshes of decent triangles. Raises GeometryError if the weights add up to zero.
     """
-    return _estimate(piece, weights)[0]
-
-
-def _estimate(piece: Piece, weights: NDArray) -> tuple[float, float | None]:
-    """A guess of c, and what is probably right to all digits: what many triangles say, as on grids, or 1."""
     sign = np.sign(weights.sum())
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
@@ -117,7 +111,7 @@ def conformal_map(
     options = options or ConformalOptions()
     likely, whole = None, 1 / unit if unit else np.inf
     if unit is None:
-        unit, likely = _estimate(piece, weights)
+        unit, likely = estimate_scale(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):

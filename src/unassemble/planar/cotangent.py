@@ -4,13 +4,10 @@ Everything is computed edge by edge from its stencil: tail t, head h and the ape
 and right. The angle at the left apex lies between t - a and h - a, that at the right one between h - b and t - b.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from ..topology.surface import Together
 
 
 def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]:
@@ -58,22 +55,6 @@ def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """(m,) twice the areas of triangles, negative where they run clockwise."""
     a, b, c = z[piece.triangles].T
     return np.asarray((np.conj(b - a) * (c - a)).imag)
-
-
-def left_by_all(
-    pieces: Sequence[Piece], weights: NDArray, positions: Sequence[NDArray], scales: NDArray
-) -> NDArray[np.float64]:
-    """(e,) what several pieces, each with its c, leave of their weights, one after the other.
-
-    Not finite at flat triangles.
-
-    `weights` (edges of the whole graph,): -A_ij of each; `positions` sequence of (n,); `scales` (pieces,).
-    """
-    union = Together(pieces)
-    cotangents = cotangent(*corner_sides(union.triangles, np.concatenate(positions)))
-    w = np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
-    with np.errstate(all="ignore"):
-        return np.asarray(weights[union.edge_rows] - np.repeat(scales, [len(piece.edges) for piece in pieces]) * w)
 
 
 def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:

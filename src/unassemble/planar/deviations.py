@@ -6,33 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linalg.responses import SamplingOptions, noise_blocks
-from ..topology import Piece
-from .cotangent import edge_weights
-from .normal import GaussNewton, Jacobian, NormalEquations, WeightJacobian, distant_pair
-
-
-def coordinate_covariances(
-    piece: Piece,
-    z: NDArray,
-    *,
-    free_scale: bool,
-    stretch: NDArray | None = None,
-    spread: NDArray | None = None,
-    options: SamplingOptions | None = None,
-) -> NDArray[np.float64]:
-    """Covariance of each vertex for independent noise of standard deviation 1 in the weights w = -A_ij / c.
-
-    The estimate z responds to noise r by y = (J'J)^+ J' r, in the gauge in which a change has no component along
-    translations, rotation and scaling. Responses to every single entry add up to the covariance exactly;
-    above `options.exact_up_to` edges random sign patterns stand in for them.
-
-    `z` (n,): in the Laplacian's frame; `free_scale`: whether c was fitted; `stretch` (2, 2): linear map from that frame
-    to the one in which covariances are wanted; `spread` (e,): standard deviations of the weights relative to 1, for
-    which z is the least-squares estimate. Returns (n, 2, 2).
-    """
-    jacobian = WeightJacobian(piece, z, spread)
-    weights = edge_weights(piece, z) / jacobian.spread
-    return covariances(jacobian, weights, z, distant_pair(z), free_scale=free_scale, stretch=stretch, options=options)
+from .normal import GaussNewton, Jacobian, NormalEquations
 
 
 def covariances(
@@ -46,11 +20,16 @@ def covariances(
     nodes: Callable[[NDArray], NDArray] = np.asarray,
     options: SamplingOptions | None = None,
 ) -> NDArray[np.float64]:
-    """Those of any model of the weights; see :func:`coordinate_covariances`.
+    """Covariance of each vertex for independent noise of standard deviation 1 in the weights w = -A_ij / c.
+
+    The estimate z responds to noise r by y = (J'J)^+ J' r, in the gauge in which a change has no component along
+    translations, rotation and scaling. Responses to every single entry add up to the covariance exactly;
+    above `options.exact_up_to` edges random sign patterns stand in for them.
 
     `jacobian`: by parameters, which are positions of some vertices; `weights` (e,): w at z, over their standard
-    deviations; `z` (n,): all vertices; `pins` (k,): parameters that are held; `nodes`: displacements of all vertices,
-    (n, k), for those of the parameters.
+    deviations; `z` (n,): all vertices, in the Laplacian's frame; `pins` (k,): parameters that are held; `free_scale`:
+    whether c was fitted; `stretch` (2, 2): linear map from that frame to the one in which covariances are wanted;
+    `nodes`: displacements of all vertices, (n, k), for those of the parameters. Returns (n, 2, 2).
     """
     equations = NormalEquations(jacobian, pins)
     system = GaussNewton(jacobian, equations, weights if free_scale else None)

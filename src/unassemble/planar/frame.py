@@ -21,7 +21,7 @@ class Similarity:
         return self.turn * (np.conj(z) if self.mirror else z) + self.shift
 
 
-def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None) -> tuple[Similarity, str | None]:
+def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray) -> tuple[Similarity, str | None]:
     """The frame that positions have where nothing else is known.
 
     Centroid at the origin, mean edge length 1, first principal axis along x, and the mirror image and half
@@ -48,23 +48,14 @@ def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None)
     if mirror:  # conjugation turns y over after the half turn has set x
         turn = np.conj(turn)
     shift = -turn * (np.conj(centre) if mirror else centre)
-    arbitrary = None
-    if tie:
-        arbitrary = (
-            "the second moments are equal in all directions, so that the axes follow the edges, and the choice among "
-            "symmetric ones is arbitrary"
-        )
-    elif not all(sure):
-        vanishing = " and ".join(name for name, known in zip("xy", sure, strict=True) if not known)
-        arbitrary = f"the third moment of {vanishing} vanishes, so the choice among mirror images is arbitrary"
+    same = "second moments are equal, so that axes follow the edges" if tie else "third moments vanish"
+    arbitrary = f"{same}, and the choice among symmetric positions is arbitrary" if tie or not all(sure) else None
     return Similarity(complex(turn), complex(shift), mirror), arbitrary
 
 
-def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> complex:
+def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray) -> complex:
     """The turn that lays edges along the axes: the fourth powers of their directions agree, or else the sixth ones."""
     for some, power in ((boundary, 4), (edges, 4), (boundary, 6), (edges, 6)):
-        if some is None or not len(some):
-            continue
         line = z[some[:, 1]] - z[some[:, 0]]
         length = np.abs(line)
         mean = np.sum(length * (line / np.where(length > 0, length, 1.0)) ** power) / max(float(length.sum()), 1e-300)

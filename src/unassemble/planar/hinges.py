@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order
 
 from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
@@ -30,12 +29,11 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     known = np.zeros(n, dtype=np.int64) if known is None else known
     group = groups(topology)
     held = _held(group, known)
-    if rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1:
-        return _along_trees(topology, positions, held)
+    stiff = rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1
     positions = _matching_images(topology, positions, held, ALIKE)
-    joined, _ = _joined(topology, positions, held)
+    joined, _ = _joined(topology, positions, held, stiff=stiff)
     # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
-    return _joined(topology, joined, held)[0]
+    return _joined(topology, joined, held, stiff=stiff)[0]
 
 
 def gap(topology: Topology, positions: list[NDArray], closed: float) -> float:
@@ -88,8 +86,10 @@ def rings(topology: Topology) -> int:
     return int(shared) - len(topology.hinges) - (len(topology.pieces) - len(np.unique(groups(topology))))
 
 
-def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> tuple[list[NDArray], float]:
-    """Least-squares similarities, and the largest distance that they leave at a shared vertex.
+def _joined(
+    topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], *, stiff: bool = False
+) -> tuple[list[NDArray], float]:
+    """Least-squares similarities, or translations if `stiff`, and the largest distance left at a shared vertex.
 
     Pieces that shrink to points meet in any image: they leave as much as there is.
     """
@@ -98,7 +98,7 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     # Unknowns are t - 1 and s; the least-norm solution keeps turns near 1. Shifts are scaled to matter little.
     size = np.array([np.abs(z).max() for z in positions])
     extent = float(size.max())
-    weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
+    weight = np.r_[np.where(held | stiff, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
     solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
@@ -126,50 +126,17 @@ def groups(topology: Topology) -> NDArray[np.int64]:
     return connected(n + topology.n_vertices, piece, n + vertex)[1][:n]
 
 
-def _along_trees(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
-    """Shifts alone, from piece to piece, where no pieces close a ring and one of each group is held."""
-    piece, vertex, at = _visits(topology, positions)
-    n, root = len(positions), len(positions) + topology.n_vertices
-    rows, columns = np.r_[piece, np.full(held.sum(), root)], np.r_[n + vertex, np.flatnonzero(held)]
-    tree = coo_array((np.ones(len(rows)), (rows, columns)), shape=(root + 1,) * 2).tocsr()
-    above = breadth_first_order(tree, root, directed=False)[1].astype(np.int64)
-    # Of each piece that is not held the hinge on the way to it, and the piece before that.
-    reached = np.flatnonzero(~held)
-    hinge = above[reached] - n
-    before = above[hinge + n]
-    visit = piece * topology.n_vertices + vertex
-    order = np.argsort(visit)
-    here, there = (
-        at[order[np.searchsorted(visit, p * topology.n_vertices + hinge, sorter=order)]] for p in (reached, before)
-    )
-    shift = np.zeros(n, dtype=np.complex128)
-    shift[reached] = there - here
-    pointer = np.arange(n)
-    pointer[reached] = before
-    while (pointer != pointer[pointer]).any():  # sums along paths by doubling; at the held pieces shifts are zero
-        shift = shift + shift[pointer]
-        pointer = pointer[pointer]
-    return [z + s for z, s in zip(positions, shift, strict=True)]
-
-
-def _visits(topology: Topology, positions: list[NDArray]) -> tuple[NDArray, NDArray, NDArray]:
-    """Piece, vertex and position in that piece for each time that a piece has a hinge."""
-    shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]
-    piece = np.repeat(np.arange(len(positions)), [len(s) for s in shared])
-    vertex = np.concatenate([p.vertices[s] for p, s in zip(topology.pieces, shared, strict=True)])
-    return piece, vertex, np.concatenate([z[s] for z, s in zip(positions, shared, strict=True)])
-
-
 def _equations(topology: Topology, positions: list[NDArray]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """One equation for each piece at a hinge after the first: (t_p - 1) z_p + s_p - ... = z_q - z_p."""
     n = len(positions)
-    piece, vertex, at = _visits(topology, positions)
+    shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]
+    piece = np.repeat(np.arange(n), [len(s) for s in shared])
+    vertex = np.concatenate([p.vertices[s] for p, s in zip(topology.pieces, shared, strict=True)])
+    at = np.concatenate([z[s] for z, s in zip(positions, shared, strict=True)])
     order = np.lexsort((piece, vertex))
     piece, vertex, at = piece[order], vertex[order], at[order]
     p = np.flatnonzero(vertex[1:] == vertex[:-1])
     q = p + 1
-    row = np.arange(len(p))
     one = np.ones(len(p), dtype=np.complex128)
-    rows = np.tile(row, 4)
     columns = np.r_[piece[p], piece[q], n + piece[p], n + piece[q]]
-    return rows, columns, np.r_[at[p], -at[q], one, -one], at[q] - at[p]
+    return np.tile(np.arange(len(p)), 4), columns, np.r_[at[p], -at[q], one, -one], at[q] - at[p]

@@ -46,7 +46,8 @@ class IterativeNormalEquations(NormalEquations):
         size = first = np.vdot(residual, y).real
         iterations = 0
         while size > 1e-10 * first and iterations < 400:  # the energy norm of the error falls by 1e-5
-            image = self._project(self._apply(direction))
+            image = self._forward.T @ (self._forward @ direction.view(np.float64))
+            image = self._project(image.view(np.complex128))
             step = size / np.vdot(direction, image).real
             x = x + step * direction
             residual = residual - step * image
@@ -56,9 +57,6 @@ class IterativeNormalEquations(NormalEquations):
             iterations += 1
         _log.debug("normal equations: %d iterations, reduction %.1e", iterations, np.sqrt(size / first) if first else 0)
         return x
-
-    def _apply(self, d: NDArray) -> NDArray:
-        return (self._forward.T @ (self._forward @ d.view(np.float64))).view(np.complex128)
 
     def _precondition(self, residual: NDArray) -> NDArray:
         return self._project(np.append(self._factor.solve(residual[:-1]), 0))

@@ -1,5 +1,6 @@
 """One piece from its entries to positions and scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SolverError
 from ..tolerances import LAST_DIGITS
 from ..topology import Piece
+from ..topology.surface import Together
 from .conformal import conformal_map
-from .cotangent import edge_weights, weight_roundings
+from .cotangent import corner_sides, cotangent, edge_weights, weight_roundings
 from .polish import CAREFUL, MOST_CAREFUL, PolishedMesh, count_flipped, errors_of_one_size, polish
 
 
@@ -31,6 +33,21 @@ def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: boo
     """Conformal solve; `sharp` where no polish follows."""
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     return PieceMesh(found.z, found.scale, () if found.converged else ("the conformal solve did not converge",))
+
+
+def left_by_all(
+    placed: Sequence[tuple[Piece, PieceMesh]], weights: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Rows of the edges of several pieces, one after the other, and what these leave of their weights.
+
+    Not finite at flat triangles. `weights` (edges of the whole graph,): -A_ij of each.
+    """
+    union = Together([piece for piece, _ in placed])
+    cotangents = cotangent(*corner_sides(union.triangles, np.concatenate([mesh.z for _, mesh in placed])))
+    w = np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
+    scales = np.repeat([mesh.scale for _, mesh in placed], [len(piece.edges) for piece, _ in placed])
+    with np.errstate(all="ignore"):
+        return union.edge_rows, np.asarray(weights[union.edge_rows] - scales * w)
 
 
 def left_by_map(piece: Piece, weights: NDArray, scale: float | None = None) -> tuple[float, NDArray[np.float64]] | None:
@@ -59,8 +76,6 @@ def refined(
     and more likely to be such noise. Without it the noise is known, and tested.
     """
     noise = None if noise is None or (noise == 1).all() else noise
-    if not np.isfinite(edge_weights(piece, mesh.z)).all():
-        return replace(mesh, notes=(*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
@@ -72,8 +87,6 @@ def refined(
         shortest = _shortest(piece, mesh.z)
         why = f"the start is too far off, with edges of {shortest:.0e} of its size" if shortest < LAST_DIGITS else error
         return replace(mesh, notes=(*mesh.notes, f"no polish: {why}"))
-    if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
-        return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
         return PieceMesh(found.z, found.scale, mesh.notes, spread)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"

@@ -47,8 +47,6 @@ def lacking_term(
     spread = np.ones(len(weights)) if spread is None else spread
     fitted = edge_weights(piece, z) / spread
     terms = terms[:, :count] / spread[:, None]
-    if not (np.isfinite(fitted).all() and np.isfinite(terms).all()):  # flat triangles
-        return None
     try:
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
@@ -62,8 +60,6 @@ def lacking_term(
         both -= direction[:, None] * (direction @ both)
     misfit, columns = both[:, 0], both[:, 1:-1]
     total = float(misfit @ misfit)
-    if not total > 0:
-        return None
     share = _explained(misfit, columns) / total
     ratio = (share / count) / max((1 - share) / (freedom - count), np.finfo(float).tiny)
     kinds = {name: np.flatnonzero(names[:count] == name) for name in dict.fromkeys(names[:count].tolist())}

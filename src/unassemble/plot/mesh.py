@@ -66,10 +66,9 @@ def draw_worst(ax: Axes, points: NDArray, pairs: NDArray) -> list[Line2D]:
     if not len(ends):
         return []
     draw_lines(ax, ends, style.WORST, 1.8, capstyle="round", zorder=6)
-    middle = ends.mean(axis=1)
-    near = np.linalg.norm(middle[:, None] - middle, axis=2) < 0.03 * np.ptp(ax.get_xlim())
-    middle = middle[~np.tril(near, -1).any(axis=1)]  # neighbours share a ring
-    ax.plot(*middle.T, "o", markersize=17, fillstyle="none", color=style.WORST, markeredgewidth=1.1, zorder=6)
+    ax.plot(
+        *ends.mean(axis=1).T, "o", markersize=17, fillstyle="none", color=style.WORST, markeredgewidth=1.1, zorder=6
+    )
     return [line_handle(style.WORST, "entries that fit worst", width=2.2)]
 
 

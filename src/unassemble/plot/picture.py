@@ -32,12 +32,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     Where a `path` is given, the picture is written there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
     On an `ax` it is drawn without heading and legend, and the figure that this belongs to is returned.
 
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    FormatError
-        If there are no positions: of a mass matrix.
+    Raises OutputError if the file cannot be written; FormatError if there are no positions: of a mass matrix.
     """
     if path is not None:
         check_plot(path)
@@ -80,23 +75,16 @@ def _details(recovery: Recovery) -> str:
     return "  ·  ".join(parts)
 
 
-def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
+def plot_comparison(true_points: ArrayLike, recovery: PlanarMesh, path: str | os.PathLike[str] | None = None) -> Figure:
     """Draw the true mesh beside the recovered one, each piece moved by the best similarity or reflection.
 
     Row i of `true_points`, (n, 2) array_like, belongs to matrix row i; `path` is as in :func:`plot_recovery`.
 
-    Raises
-    ------
-    InputError
-        If `true_points` has another shape, or `recovery` is no planar mesh.
-    OutputError
-        If the file cannot be written.
+    Raises InputError if `true_points` has another shape; OutputError if the file cannot be written.
     """
     if path is not None:
         check_plot(path)
     truth = np.asarray(true_points, dtype=np.float64)
-    if not isinstance(recovery, PlanarMesh):
-        raise InputError("only planar meshes are drawn beside the true ones")
     if truth.shape != recovery.points.shape:
         raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
     aligned = align(recovery.points, truth, recovery.component)

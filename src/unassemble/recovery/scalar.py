@@ -63,15 +63,11 @@ class PlanarMesh(Recovery):
         return float(np.nanmax(deviations))
 
     def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Triangles, with the polygons in fans.
+        """Triangles (m, 3), with the polygons in fans.
 
-        Returns
-        -------
-        triangles : (m, 3) int64
-        outline : (m, 3) bool
-            False for sides, from each corner to the next, that are diagonals of polygons.
+        And (m, 3) bool, false for sides, from each corner to the next, that are diagonals of polygons.
         """
-        fans, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
+        fans, _, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
         return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..cells import Alternative
 from ..certify import Certificate
-from ..planar.terms import COEFFICIENT, MASS, ONE_SIGN, Term
-from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL
+from ..planar.terms import COEFFICIENT, MASS, Term
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology import Topology
 from ..words import Reason, count_of, words_of
 from .evidence import Evidence
@@ -20,7 +20,6 @@ from .noise import NoiseTest
 if TYPE_CHECKING:
     from .verdict import Findings
 
-_ROWS = 6  # at most, named as those that hold nearly all of a misfit
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
@@ -42,11 +41,8 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
-        one = f"the nonzero entry of rows {i} and {j} belongs to no triangle"
-        many = f"{len(bare):,} nonzero entries belong to no triangle, the first that of rows {i} and {j}"
-        return Reason.of(one if len(bare) == 1 else many, advice=model)
-    if not np.isfinite(certificate.backward_error):
-        return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=model)
+        some = count_of(len(bare), "nonzero entry belongs", "nonzero entries belong")
+        return Reason.of(f"{some} to no triangle, the first that of rows {i} and {j}", advice=model)
     if len(certificate.flipped):
         return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
     (i, j), largest = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
@@ -56,10 +52,8 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
     )
     if evidence.term and not f.known_scale:
         return lacking(f, evidence.term)
-    if len(evidence.suspects):
-        return Reason.of(
-            _culprits(evidence), *notes, differs, advice="check the entries that stand out, which the report lists"
-        )
+    if stands_out := _culprits(evidence):
+        return Reason.of(stands_out, *notes, differs, advice="check the entries that stand out, which the report lists")
     if without:
         return Reason.of(
             _unexplained(certificate) or differs,
@@ -82,16 +76,12 @@ def lacking(f: Findings, term: Term) -> Reason:
     """The reason of a misfit that a term explains which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
-    varies = "a coefficient that varies in space, and a constant one is assumed"
     if term.name == COEFFICIENT or f.stored.adds_up.all():  # with a mass matrix, or one number added, rows do not
-        which = f"it has the form of {varies}"
-        if term.name != COEFFICIENT:
-            which = f"all rows add up to zero, as with {varies}"
+        which = "a coefficient that varies in space leaves such, and a constant one is assumed"
         return Reason.of(begun, which, advice="assemble the matrix with a constant coefficient")
     if term.name == MASS:
         which = "it has the form of a mass matrix, and the rows do not add up to zero: A = c L + s M"
         return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
-    assert term.name == ONE_SIGN
     return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
 
 
@@ -104,23 +94,12 @@ def _culprits(evidence: Evidence) -> str:
 
 
 def _unexplained(certificate: Certificate) -> str:
-    """The sentence where no few entries are to blame: how much is left, and around which rows."""
+    """The sentence where no few entries are to blame; empty where little is left."""
     if certificate.backward_error <= ALIKE:
         return ""
-    squares = certificate.misfits**2
-    left = squares.copy()
-    rows: list[int] = []
-    while len(rows) < _ROWS and left.sum() > (1 - NEARLY_ALL) * squares.sum():
-        at_row = np.bincount(certificate.pairs.ravel(), np.repeat(left, 2))
-        rows.append(int(at_row.argmax()))
-        left[(certificate.pairs == rows[-1]).any(axis=1)] = 0.0
-    share = 1 - left.sum() / squares.sum()
-    count = int((certificate.misfits > ALIKE).sum())
-    return (
-        f"no set of cells was found that fits: {count_of(count, 'entry', 'entries')} of {len(squares):,} "
-        f"{'is' if count == 1 else 'are'} left unexplained, with {share:.0%} of the squared misfit in "
-        f"{'row' if len(rows) == 1 else 'the rows'} {words_of(sorted(rows))}"
-    )
+    count, whole = int((certificate.misfits > ALIKE).sum()), len(certificate.misfits)
+    left = "1 entry is" if count == 1 else f"{count:,} entries are"
+    return f"no set of cells was found that fits: {left} left unexplained, of {whole:,}"
 
 
 def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) -> str:
@@ -136,10 +115,8 @@ def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) ->
 
 def _turned_over(topology: Topology, certificate: Certificate) -> str:
     triangles = np.concatenate([piece.vertices[piece.triangles] for piece in topology.pieces])
-    rows = words_of(np.sort(triangles[certificate.flipped[0]]))
-    k = len(certificate.flipped)
-    which = "1 triangle is" if k == 1 else f"{k} triangles are"
-    return f"{which} flat or turned over, the first that of rows {rows}"
+    which = count_of(len(certificate.flipped), "triangle is", "triangles are")
+    return f"{which} flat or turned over, the first that of rows {words_of(np.sort(triangles[certificate.flipped[0]]))}"
 
 
 def with_noise(f: Findings, test: NoiseTest) -> Reason:
@@ -210,9 +187,7 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
 def nothing_to_spare(certificate: Certificate, rows: NDArray[np.int64], *, known_scale: bool) -> Reason:
     """The reason of a mesh with pieces of as many unknowns as equations, by a row of each."""
     which = (
-        f"the piece of row {rows[0]} has"
-        if len(rows) == 1
-        else f"{len(rows)} pieces, the first that of row {rows[0]}, have"
+        f"the piece of row {rows[0]} has" if len(rows) == 1 else f"{len(rows)} pieces, as that of row {rows[0]}, have"
     )
     return Reason.of(
         f"{which} no entry to spare: nearly any entries belong to such a mesh, and that it gives the matrix back to "

@@ -1,7 +1,7 @@
 """A scalar matrix on one page: recognise, solve, place, certify."""
 
-from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.deviations import coordinate_covariances
+from ..planar.cotangent import edge_weights
+from ..planar.deviations import covariances
+from ..planar.normal import WeightJacobian, distant_pair
 from ..recovery import PlanarMesh
 from ..tolerances import SIGMAS
 from ..topology import Polygons
@@ -74,13 +76,10 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
             deviations = _deviations(solved, task, placed)
     written = _held_against(stored, solved, mesh, mesh.shifted(origins), task) if origins.any() else near
     findings = Findings(stored, solved, mesh, origins, near, written, evidence, not free_scale, task.options.polished)
-
-    def other_meshes() -> tuple[list[Alternative], str]:
-        with clock("ambiguity") if solved.topology.method == "the numbers" else nullcontext():  # else next to nothing
-            return _other_meshes(findings, task)
-
     notes = [*solved.matrix.warnings, *notes, *vanished_notes(topology), *topology.failures]
-    return _report(findings, verdict(findings, other_meshes), notes, deviations, clock, task)
+    return _report(
+        findings, verdict(findings, partial(_other_meshes, findings, clock, task)), notes, deviations, clock, task
+    )
 
 
 def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
@@ -90,13 +89,10 @@ def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
     result = np.full((solved.topology.n_vertices, 2), np.nan)
     for p in range(len(pieces))[::-1]:  # the first piece at a hinge comes last
-        covariance = coordinate_covariances(
-            pieces[p],
-            tensor.to_laplacian(placed[p]) if tensor else placed[p],
-            free_scale=free,
-            stretch=tensor.root if tensor else None,
-            spread=meshes[p].spread,
-        )
+        z = tensor.to_laplacian(placed[p]) if tensor else placed[p]
+        jacobian, stretch = WeightJacobian(pieces[p], z, meshes[p].spread), tensor.root if tensor else None
+        weights = edge_weights(pieces[p], z) / jacobian.spread
+        covariance = covariances(jacobian, weights, z, distant_pair(z), free_scale=free, stretch=stretch)
         own = sigma / abs(meshes[p].scale)
         result[pieces[p].vertices] = own * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
@@ -109,7 +105,7 @@ def _held_against(stored: OperatorMatrix, solved: Solved, mesh: JoinedMesh, poin
     return Held.of(certificate, stored, noise, solved.freedom(free_scale=task.scale is None), solved.scales)
 
 
-def _other_meshes(findings: Findings, task: Task) -> tuple[list[Alternative], str]:
+def _other_meshes(findings: Findings, clock: Clock, task: Task) -> tuple[list[Alternative], str]:
     """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
 
     Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
@@ -128,7 +124,7 @@ def _other_meshes(findings: Findings, task: Task) -> tuple[list[Alternative], st
         z = np.asarray(task.placement.tensor.to_laplacian(z), dtype=np.complex128)
     cells = Polygons.joined([Polygons.of_triangles(mesh.triangles[~mesh.in_polygon]), mesh.polygons])
     agree = SIGMAS * sigma / float(np.abs(solved.scales).min())
-    with blas_threads(1):  # many small problems
+    with clock("ambiguity"), blas_threads(1):  # many small problems
         others = alternatives(given.without(zero), cells, z, task.scale, agree)
     return others, "ambiguous" if others else "proved" if shown else "searched"
 
@@ -139,7 +135,7 @@ def _report(
     """Everything under the names that callers know."""
     solved, evidence, mesh, held = findings.solved, findings.evidence, findings.mesh, findings.written
     topology, options = solved.topology, task.options
-    refused = found.status == "uncertified" and not found.distant
+    refused = found.status == "uncertified" and found.uniqueness is None
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     component = connected(findings.stored.n, *findings.stored.edges.T)[1]

@@ -13,9 +13,8 @@ from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.cotangent import left_by_all
 from ..planar.hinges import groups
-from ..planar.piece import PieceMesh, collapsed, positions, refined
+from ..planar.piece import PieceMesh, collapsed, left_by_all, positions, refined
 from ..tolerances import NOISY
 from ..topology import Piece, Topology
 from ..words import sentences
@@ -99,15 +98,18 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
         starts = meshes
         meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         if noise and noise.digits:
-            z, scales = [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes])
-            left = left_by_all(topology.pieces, -matrix.entries, z, scales)
-            rows = np.concatenate([piece.edge_rows for piece in topology.pieces])
+            rows, left = left_by_all(list(zip(topology.pieces, meshes, strict=True)), -matrix.entries)
             with np.errstate(all="ignore"):  # flat triangles
                 rounding = np.sqrt(np.mean((left / with_vanished(topology, noise)[rows] / noise.sigma) ** 2)) <= NOISY
             if not rounding:  # sizes that errors of rounding have are no guide to others
                 noise = None
                 meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
-        topology, meshes = _successes(topology, list(map(_sound, topology.pieces, meshes)))
+        whys = [collapsed(piece, mesh.z) for piece, mesh in zip(topology.pieces, meshes, strict=True)]
+        sound: list[Outcome] = [
+            GeometryError(sentences([f"no mesh fits, and {why} in the nearest one", *mesh.notes])) if why else mesh
+            for why, mesh in zip(whys, meshes, strict=True)
+        ]
+        topology, meshes = _successes(topology, sound)
     return Solved(matrix, topology, meshes, noise)
 
 
@@ -127,12 +129,6 @@ def _polished(
     return [first.get(p) or polished(p, scale or first[int(lead[p])].scale) for p in range(len(meshes))]
 
 
-def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:
-    """A mesh whose points have places of their own; else why it is none."""
-    why = collapsed(piece, mesh.z)
-    return GeometryError(sentences([f"no mesh fits, and {why} in the nearest one", *mesh.notes])) if why else mesh
-
-
 def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, list[PieceMesh]]:
     """Pieces that have positions; an error where there are none."""
     meshes = [mesh for mesh in outcomes if isinstance(mesh, PieceMesh)]
@@ -145,13 +141,7 @@ def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, l
         raise errors[0] if errors else GeometryError("the cycles of three edges form no mesh")
     if errors:
         pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
-        used, polygons = np.zeros(topology.n_vertices, dtype=bool), topology.polygons
-        used[np.concatenate([piece.vertices for piece in pieces])] = True
-        if polygons.count:
-            whole = np.logical_and.reduceat(used[polygons.vertices], polygons.offsets[:-1])
-            polygons = polygons.chosen(whole, np.arange(topology.n_vertices))
-        failures = (*topology.failures, *map(str, errors))
-        topology = replace(topology, pieces=tuple(pieces), polygons=polygons, failures=failures)
+        topology = replace(topology, pieces=tuple(pieces), failures=(*topology.failures, *map(str, errors)))
     return topology, meshes
 
 

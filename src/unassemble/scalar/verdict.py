@@ -48,11 +48,6 @@ class Findings:
         """Stages that did not converge."""
         return [note for mesh in self.solved.meshes for note in mesh.notes]
 
-    @property
-    def far_away(self) -> bool:
-        """Whether the mesh fits until its coordinates are written."""
-        return self.near.passes and not self.written.passes
-
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -63,8 +58,6 @@ class Verdict:
     uniqueness: str | None
     reason: Reason
     others: Sequence[Alternative] = ()  # other meshes that fit
-    # whether coordinates so far from the origin that they have too few digits are the only obstacle
-    distant: bool = False
 
 
 def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str]]) -> Verdict:
@@ -80,9 +73,8 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
     others, uniqueness = other_meshes()
     if others:
         return Verdict("ambiguous", uniqueness, ambiguous(others, f.certificate), others)
-    if f.far_away:
-        why = far_away(f.origins, f.written.certificate, f.certificate)
-        return Verdict("uncertified", uniqueness, why, distant=True)
+    if f.near.passes and not f.written.passes:
+        return Verdict("uncertified", uniqueness, far_away(f.origins, f.written.certificate, f.certificate))
     return Verdict("certified", uniqueness, reason)
 
 

@@ -35,13 +35,14 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
         sides = around(n, edges, quads) >> 1
         count = count + np.bincount(sides.ravel(), minlength=len(edges))
         quads = quads[(count[sides] <= 2).all(axis=1)]
-    given: list[FaceComplex] = []
-    seen: set[bytes] = set()
+    # The same for drawings with the same faces, mirrored or not: sums over each face of a number for each edge.
+    number, seen = np.random.default_rng(0).integers(1 << 62, size=len(edges)).astype(np.uint64), set[bytes]()
     for drawing in _drawings(n, edges, triangles, quads):
-        seen.update(map(fingerprint, given))  # mostly there is no second one to compare with
-        given.clear()
-        if not seen or fingerprint(drawing) not in seen:
-            given.append(drawing)
+        blocks = drawing.split()
+        sums = np.zeros(len(blocks.size), dtype=np.uint64)
+        np.add.at(sums, blocks.face, np.repeat(number, 2))
+        if (name := np.sort(sums).tobytes()) not in seen:
+            seen.add(name)
             yield drawing
 
 
@@ -59,14 +60,6 @@ def _drawings(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> Ite
     rotation = rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
-
-
-def fingerprint(drawing: FaceComplex) -> bytes:
-    """The same for drawings with the same faces, mirrored or not: sums over each face of a number for each edge."""
-    number = np.random.default_rng(0).integers(1 << 62, size=len(drawing.edges)).astype(np.uint64)
-    sums = np.zeros(len(drawing.split().size), dtype=np.uint64)
-    np.add.at(sums, drawing.split().face, np.repeat(number, 2))
-    return np.sort(sums).tobytes()
 
 
 def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:

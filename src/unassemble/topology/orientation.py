@@ -41,14 +41,6 @@ def glue(n_edges: int, opposite: NDArray) -> Gluing:
     return Gluing(count, first, second)
 
 
-def reglue(gluing: Gluing, flip: NDArray) -> Gluing:
-    """The gluing after the triangles marked in `flip` (m,) have had their last two corners exchanged."""
-    corner = np.arange(3 * len(flip)).reshape(-1, 3)
-    corner[flip] = corner[flip][:, [0, 2, 1]]
-    moved = np.append(corner.ravel(), -1)  # -1 stays -1
-    return Gluing(gluing.count, moved[gluing.first], moved[gluing.second])
-
-
 def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArray]:
     """Turn triangles so that neighbours run along their common edge in opposite directions.
 

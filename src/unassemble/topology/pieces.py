@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .keys import Grouped, distinct, first_rows
-from .orientation import boundary_corners, following, glue, loops, orient, reglue
+from .orientation import Gluing, boundary_corners, following, glue, loops, orient
 from .surface import Piece
 
 
@@ -40,7 +40,10 @@ def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray)
     if not orientable.all():
         return None
     triangles, opposite = (np.where(flip[:, None], of[:, [0, 2, 1]], of) for of in (triangles, opposite))
-    gluing = reglue(gluing, flip)
+    corner = np.arange(triangles.size).reshape(-1, 3)
+    corner[flip] = corner[flip][:, [0, 2, 1]]
+    moved = np.append(corner.ravel(), -1)  # -1 stays -1
+    gluing = Gluing(gluing.count, moved[gluing.first], moved[gluing.second])
     corners = boundary_corners(gluing)
     if not len(corners):
         return None

@@ -73,20 +73,18 @@ class Polygons:
         size = self.size
         return Polygons(np.append(0, np.cumsum(size[which])), number[self.vertices[np.repeat(which, size)]])
 
-    def fans(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Triangles about the first vertex of each polygon.
+    def fans(self, shift: NDArray | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles about one vertex of each polygon, that in place `shift`, (count,), the first one by default.
 
-        Returns `triangles` (m, 3); `outline` (m, 3): whether the side from each corner to the next belongs to the
-        polygon; the others are diagonals.
+        Returns `triangles` (m, 3); `owner` (m,): the polygon of each; `outline` (m, 3): whether the side from each
+        corner to the next belongs to the polygon; the others are diagonals.
         """
-        size = self.size - 2
-        owner, step = runs(size)
-        step += 1
-        start = self.offsets[owner]
-        triangles = np.column_stack(
-            [self.vertices[start], self.vertices[start + step], self.vertices[start + step + 1]]
-        )
-        return triangles, np.column_stack([step == 1, np.ones(len(step), bool), step == size[owner]])
+        owner, step = runs(self.size - 2)
+        corner = np.column_stack([np.zeros_like(step), step + 1, step + 2])
+        if shift is not None:
+            corner = (corner + shift[owner][:, None]) % self.size[owner][:, None]
+        outline = np.column_stack([step == 0, np.ones(len(step), bool), step + 3 == self.size[owner]])
+        return self.vertices[self.offsets[owner][:, None] + corner], owner, outline
 
     def counter_clockwise(self, points: NDArray) -> Polygons:
         """The same polygons, each in the order in which its area is positive.

@@ -83,12 +83,6 @@ class Candidates:
         """Number of cells."""
         return self.cells.count
 
-    @property
-    def judged_by(self) -> float:
-        """The c that angles are judged by."""
-        given = np.flatnonzero(self.weights)[0]
-        return float(self.weights[given] / self.relative[given])
-
     def with_more(self, cells: Sequence[Sequence[int]]) -> Candidates:
         """With further cells, which claim no half-edges."""
         more = np.zeros(len(cells), dtype=bool)

@@ -14,10 +14,9 @@ from ...planar.hinges import gap
 from ...planar.piece import PieceMesh
 from ...tolerances import ALIKE, SMALL
 from ...topology import Piece, Topology
-from ...topology.keys import pair_keys, with_sides
+from ...topology.keys import contains, pair_keys, with_sides
 from ...topology.pieces import planar_pieces
 from ..candidates.candidates import Candidates
-from .fans import triangulated
 from .within_errors import Placed, misfits, polished
 
 _OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
@@ -74,7 +73,10 @@ class Labelling:
         else:
             placed, misfit = better, misfits(n, edges, weights, better, errors)
         _add_discord(n, edges, placed, misfit, candidates.scale, errors)
-        misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
+        # Vertices with more than four right angles: the mesh would wind around them more than once.
+        apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
+        crowded = np.bincount(apex[labels & candidates.corner], minlength=n) > 4
+        misfit[crowded[edges].any(axis=1)] = 1.0
         found = dict(placed)
         return replace(bare, meshes=tuple(map(found.get, bare.pieces)), misfit=misfit)
 
@@ -112,10 +114,27 @@ class Labelling:
         return self.candidates.scale or max(solved, default=(0, 1.0))[1]
 
 
-def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Vertices with more than four right angles: the mesh would wind around them more than once."""
-    apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
-    return np.flatnonzero(np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > 4)
+def triangulated(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m, 3) triangles of the chosen cells, longer ones in fans.
+
+    The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
+    """
+    n, cells = candidates.n_vertices, candidates.cells.chosen(labels, np.arange(candidates.n_vertices))
+    given, shift = candidates.edges[:, 0] * n + candidates.edges[:, 1], np.zeros(cells.count, dtype=np.int64)
+    for _ in range(int(candidates.cells.size.max())):
+        triangles, cell, outline = cells.fans(shift)
+        diagonal = ~outline[:, 2]  # each belongs to the triangle before it
+        key, owner = pair_keys(n, *triangles[diagonal][:, [2, 0]].T), cell[diagonal]
+        value, place, count = np.unique(key, return_inverse=True, return_counts=True)
+        clash = contains(given, value) | (count > 1)
+        if not clash.any():
+            break
+        moved = owner[clash[place]]
+        # Of two cells that want the same diagonal one keeps it.
+        keeps = np.unique(key[clash[place]], return_index=True)[1]
+        moved = np.setdiff1d(moved, moved[keeps][count[clash] > 1])
+        shift[moved] += 1
+    return triangles
 
 
 def _add_discord(

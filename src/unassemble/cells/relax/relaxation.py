@@ -14,43 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecoveryError
-from ...planar.piece import PieceMesh
 from ..candidates.candidates import Candidates
 from .sheet import Sheet
 
 _FIRST, _LAST, _FACTOR = 0.3, 1e-3, 0.75
 """Barriers t, and the ratio of one to the one before."""
-
-
-def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-    """Whole labels at the end of a path that begins with all chosen candidates as cells.
-
-    `free` (k,): which of the chosen candidates may be holes; the others are known cells.
-
-    Returns (cells,), None where there is no conformal map on the way, or an equation is singular.
-    """
-    strength = np.zeros(sheet.candidates.count)
-    strength[sheet.chosen] = np.where(free, 0.95, 1.0)
-    changing, t, placed = np.flatnonzero(sheet.chosen)[free], _FIRST, None
-    try:
-        while t > _LAST:
-            placed = sheet.mapped(strength, placed)
-            strength[changing] = _step(sheet, placed, strength, changing, t)
-            t *= _FACTOR
-    except RecoveryError:
-        return None
-    return strength > 0.5
-
-
-def _step(sheet: Sheet, placed: PieceMesh, strength: NDArray, changing: NDArray, t: float) -> NDArray[np.float64]:
-    """New strengths of the candidates that may change."""
-    s, slack = strength[changing], 0.03 * t / _FIRST
-    with np.errstate(divide="ignore"):  # larger misfits than 0.3 count themselves, not by their squares
-        trust = np.minimum(0.3 / np.abs(sheet.misfit(placed, strength)), 1.0) / slack
-    held = 1e-9 / slack + t / s**2 + t / (1 - s) ** 2
-    pull = 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
-    moved = s + sheet.label_step(placed, strength, changing, trust, held, pull)
-    return np.clip(moved, 0.1 * s, 1 - 0.1 * (1 - s))  # not all of the way to 0 or 1
 
 
 def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
@@ -60,7 +28,7 @@ def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray
     so there are more conditions than holes, unless these are very many. Labels between 0 and 1 then need no good start
     as long as what is certain is left as it is: a triangle with a side of its own is a cell.
 
-    None where some edge lies on no triangle, there are too few equations, or no conformal map.
+    None where some edge lies on no triangle, there are too few equations, no conformal map on the way, or no step.
 
     `state` (m,): 1 for known cells among its triangles, -1 for known holes, else 0.
     """
@@ -72,7 +40,22 @@ def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray
     cells, free = np.zeros((2, candidates.count), dtype=bool)
     cells[number] = state >= 0
     free[number] = (state == 0) & ~(count == 1)[sides].any(axis=1)
-    sheet = Sheet(candidates, candidates.scale or candidates.judged_by, cells)
-    with np.errstate(all="ignore"):  # a given scale may be out of all proportion
-        labels = relaxed(sheet, free[cells])
-    return None if labels is None else (labels, free)
+    given = np.flatnonzero(candidates.weights)[0]
+    judged_by = float(candidates.weights[given] / candidates.relative[given])  # the c that angles are
+    sheet = Sheet(candidates, candidates.scale or judged_by, cells)
+    strength, t, placed = np.where(cells, np.where(free, 0.95, 1.0), 0.0), _FIRST, None
+    try:
+        with np.errstate(all="ignore"):  # a given scale may be out of all proportion
+            while t > _LAST:
+                placed = sheet.mapped(strength, placed)
+                s, slack = strength[free], 0.03 * t / _FIRST
+                # Larger misfits than 0.3 count themselves, not by their squares.
+                trust = np.minimum(0.3 / np.abs(sheet.misfit(placed, strength)), 1.0) / slack
+                held = 1e-9 / slack + t / s**2 + t / (1 - s) ** 2
+                pull = 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
+                moved = s + sheet.label_step(placed, strength, np.flatnonzero(free), trust, held, pull)
+                strength[free] = np.clip(moved, 0.1 * s, 1 - 0.1 * (1 - s))  # not all of the way to 0 or 1
+                t *= _FACTOR
+    except RecoveryError:
+        return None
+    return strength > 0.5, free

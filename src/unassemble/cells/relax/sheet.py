@@ -16,7 +16,6 @@ from ...planar.pencil import ConformalPencil, ShiftedSearch
 from ...planar.piece import PieceMesh
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.fans import fans
 
 STEEPEST = 1e5
 """Cotangents beyond belong to flat triangles."""
@@ -34,7 +33,8 @@ class Sheet:
         self.n_vertices = n = candidates.n_vertices
         # (cells,) candidates that can be cells, k of them: these have triangles, (m, 3), of the candidates `cell`, (m,)
         self.chosen = (candidates.cells.size <= 40) & ~candidates.outer if chosen is None else chosen
-        self.triangles, self.cell, _ = fans(candidates, self.chosen)
+        triangles, cell, _ = candidates.cells.fans()
+        self.triangles, self.cell = triangles[self.chosen[cell]], cell[self.chosen[cell]]
         # (e, 2) edges of the graph and of the triangles, and (m, 3) the rows of those that face the corners
         self.edges, given, self.row = with_sides(n, candidates.edges, self.triangles)
         tails, heads = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]

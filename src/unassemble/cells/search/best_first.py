@@ -91,7 +91,9 @@ class BestFirst:
         while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < SEARCH.in_vain:
             value, number, labelling, changed = heapq.heappop(self._waiting)
             if changed is None:
-                if self._hopeless:
+                # The misfit, about proportional to the number of wrong labels, will not be gone falling as it has.
+                falls = self._first - self._least
+                if self._ranked >= SEARCH.at_least and self._ranked * self._least > SEARCH.patience * falls:
                     break
                 self._seen.add(self._updates.outline(labelling.labels))
                 self._ranked += 1
@@ -108,13 +110,6 @@ class BestFirst:
                 heapq.heappush(self._waiting, (value, number, labelling, changed))
         _log.debug("best-first: misfit %.1e, %d labellings ranked", self.best.size, self._ranked)
         return self.best
-
-    @property
-    def _hopeless(self) -> bool:
-        """Whether the misfit, about proportional to the number of wrong labels, will not be gone falling as it has."""
-        return self._ranked >= SEARCH.at_least and (
-            self._ranked * self._least > SEARCH.patience * (self._first - self._least)
-        )
 
     def _turned(self, labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
         """The labels after a move; with cells on all edges, unless some cells claim no half-edges."""

@@ -83,6 +83,9 @@ class Around:
     def regrouped(self) -> Iterator[Move]:
         """Two right angles at one vertex regrouped, where what they hold together can lie so."""
         edges = self.candidates.edges
+        # Each vertex of a cell, and those before and after it.
+        cells = self.candidates.cells.chosen(self.labels, np.arange(len(self.z))).cycles
+        wedges = {(cell[k - 1], frozenset((cell[k - 2], cell[k]))) for cell in cells for k in range(len(cell))}
         for one, other in self.alike:
             old = {one.cell, other.cell}
             rest = {one.rest, other.rest} - {-1}
@@ -91,7 +94,7 @@ class Around:
                 if any(x == y or joined(len(self.z), edges, np.array([x]), np.array([y]))[0] for x, y in pairs):
                     continue
                 new = {self._number[frozenset((x, one.apex, y))] for x, y in pairs}
-                taken = new & (old | rest) or any((one.apex, frozenset(pair)) in self._wedges for pair in pairs)
+                taken = new & (old | rest) or any((one.apex, frozenset(pair)) in wedges for pair in pairs)
                 if not taken and all(self._may_lie(part, one.apex, *pair) for pair in pairs):
                     yield tuple(sorted(old | rest | new))
 
@@ -107,9 +110,7 @@ class Around:
             sides = [loop.get(frozenset(angle.ends), -1) for angle in (one, other)]
             if one.rest == other.rest == -1 and min(sides) >= 0 and sides[0] != sides[1]:
                 ends.append((one, other))
-        for (a, b), (d, f) in combinations(ends, 2):
-            if a.apex == d.apex:
-                continue
+        for (a, b), (d, f) in (both for both in combinations(ends, 2) if both[0][0].apex != both[1][0].apex):
             old = {a.cell, b.cell, d.cell, f.cell}
             part = self._parts(old, set())
             pairs = [(a.apex, *pair) for pair in _turned_over(a, b)] + [(d.apex, *pair) for pair in _turned_over(d, f)]
@@ -132,12 +133,6 @@ class Around:
     @cached_property
     def _number(self) -> dict[frozenset[int], int]:
         return {frozenset(cell): k for k, cell in enumerate(self.candidates.cells.cycles)}
-
-    @cached_property
-    def _wedges(self) -> set[tuple[int, frozenset[int]]]:
-        """Each vertex of a cell, and those before and after it."""
-        cells = self.candidates.cells.chosen(self.labels, np.arange(len(self.z)))
-        return {(cell[k - 1], frozenset((cell[k - 2], cell[k]))) for cell in cells.cycles for k in range(len(cell))}
 
     def _parts(self, old: set[int], rest: set[int]) -> dict[tuple[int, int], int]:
         """For each side (tail, head) of a cell the part, connected by edges, that it belongs to without some cells."""
