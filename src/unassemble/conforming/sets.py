@@ -223,11 +223,7 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
             lone = degree[hub] == 4 + contains(within, around).sum(axis=0)  # no cells but three
             new = (triangles != hub[:, None]).all(axis=1)
             outline |= by_quad[:, k] & new & lone & contains(known, around).all(axis=0)
-    triangles = triangles[~outline]
-    every = np.sort(np.concatenate([pairs_of(common.n, cells).ravel() for cells in (triangles, quads)]))
-    pairs = pairs_of(common.n, triangles)
-    crowded = np.searchsorted(every, pairs, side="right") - np.searchsorted(every, pairs) > 2
-    return triangles[~crowded.all(axis=1)]
+    return triangles[~outline]
 
 
 def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
@@ -281,14 +277,8 @@ def _rings(graph: Graph) -> NDArray[np.int64]:
     several = sp.csr_array(sum(open_graph[column] for column in sides.T))
     several.data = (several.data == 2).astype(np.int32)
     several.eliminate_zeros()
-    count = np.diff(several.indptr)
-    found = [np.empty((0, 9), np.int64)]
-    for size in range(4, 9):  # at a corner of three cells the side between the other two is coupled to two of ours, too
-        some = np.flatnonzero(count == size)
-        nodes = several[some].indices.reshape(-1, size).astype(np.int64)
-        for four in combinations(range(size), 4):
-            found.append(_closed(graph, nodes[:, four], sides[some], middle[some]))
-    return np.concatenate(found)
+    some = np.flatnonzero(np.diff(several.indptr) == 4)
+    return _closed(graph, several[some].indices.reshape(-1, 4).astype(np.int64), sides[some], middle[some])
 
 
 def _closed(graph: Graph, corners: NDArray, sides: NDArray, middle: NDArray) -> NDArray[np.int64]:

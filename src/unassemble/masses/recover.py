@@ -89,7 +89,7 @@ def recover_elements_with_terms(
         def plain(left: OperatorMatrix) -> PlanarMesh:
             return of_cells(left, [cells])
 
-        return settled(held, weights, cells.blocks, plain, patience=0 if told else 9, told=bool(told))
+        return settled(held, weights, cells.blocks, plain, 0 if told else 9, told=bool(told))
     except RecoveryError:
         return None
 
@@ -189,7 +189,7 @@ def with_consistent_mass(held: Held, topology: Topology, plain: Plain, clock: Cl
         return None
     areas, squared_lengths, _ = fit
     weights = {TRIANGLE: evenly(TRIANGLE, held.sign * areas)}
-    return settled(held, weights, {TRIANGLE: triangles}, lambda left: plain(left, squared_lengths), patience=0)
+    return settled(held, weights, {TRIANGLE: triangles}, lambda left: plain(left, squared_lengths), 0, told=False)
 
 
 def with_lumped_mass(held: Held, found: PlanarMesh) -> PlanarMesh:
