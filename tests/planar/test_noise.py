@@ -135,7 +135,7 @@ def channel(length, width):
 def test_noise_that_lets_points_coincide_leaves_no_mesh():
     known, sigma = channel(200, 5), 2e-2
     matrix = noisy(known.matrix, sigma, seed=4)
-    with pytest.raises(GeometryError, match=r"coincide in the nearest one\. No polish: the start is too far off"):
+    with pytest.raises(GeometryError, match=r"coincide in the nearest one\. No polish: "):
         recover(matrix, noise=sigma)
     with pytest.raises(GeometryError, match="points coincide"):
         recover(matrix, noise=sigma, refine=False)

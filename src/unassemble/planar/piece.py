@@ -84,9 +84,7 @@ def refined(
             spread = noise
             found = polish(piece, weights, found.z, scale=scale, spread=spread)
     except SolverError as error:
-        shortest = _shortest(piece, mesh.z)
-        why = f"the start is too far off, with edges of {shortest:.0e} of its size" if shortest < LAST_DIGITS else error
-        return replace(mesh, notes=(*mesh.notes, f"no polish: {why}"))
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
     if found.converged:
         return PieceMesh(found.z, found.scale, mesh.notes, spread)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"

@@ -109,10 +109,7 @@ def _by_itself(f: Findings) -> tuple[bool, Reason]:
 def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
     """Where a test against the errors of the entries decides: likely, and no part of it explained by another model."""
     if test.noise.digits and not (test.drowned or test.likely):
-        why = misfit(f, ())
-        short = ". " not in why.text  # of a single sentence
-        more = (unlikely(test, f.certificate), *astray(f))
-        return False, Reason.of(why.text, *more, advice=why.advice) if short else why
+        return False, misfit(f, (unlikely(test, f.certificate), *astray(f)))
     reason = with_noise(f, test)
     if f.near.passes and f.evidence.term:
         return False, reason
