@@ -8,7 +8,7 @@ assembled here on the mesh as written and held against the matrix as given.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,8 +22,6 @@ from ..recovery import Body, PlanarMesh, Recovery
 from ..tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
 from ..words import sentences
 from .cells import mass_matrix, weights_at
-
-Mesh = TypeVar("Mesh", bound=Recovery)
 
 
 def weighed(
@@ -72,7 +70,7 @@ def weighed(
     sized = len(anchors) > 1
     if not sized:
         centre = np.array(anchors[0][1:] if anchors else [0.0] * found.dim)[: found.dim]
-        found = enlarged(found, factors ** (1 / found.dim), centre)
+        found = _enlarged(found, factors ** (1 / found.dim), centre)
     density = float(factors[0]) if sized else 1.0
     misfit = _misfit(density * _assembled(found, lumped), M, whole)
     off = found.position_error if isinstance(found, Body) else None  # a diameter is no longer than all edges
@@ -143,7 +141,7 @@ def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> f
     return float((over.data[some] / (root[over.row] * root[over.col])[some]).max(initial=0.0))
 
 
-def enlarged(found: Mesh, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Mesh:
+def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Recovery:
     """The mesh with each piece so many times as large, from a point (d,), or one for each node, and its moduli too."""
     if len(found.hinges) and np.ptp(times) > AGREED * times.max():
         raise GeometryError(
