@@ -1,14 +1,12 @@
 """Coordinates from an elasticity matrix: the whole room on one page."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elements.kinds import KINDS
-from ..elements.surface import boundary_loops
+from ..elements.surface import fields_of
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..nodes.anchoring import Request, anchored
@@ -113,7 +111,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         notes.append("all nodes are coupled, as those of one element: which rows are of one node may be another choice")
     guessed = guessed_directions(numbering, loose)
     return Body(
-        **_cell_fields(shown),
+        **fields_of(shown.blocks),
         points=points,
         component=component,
         scale=scale,
@@ -163,22 +161,6 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
 def _flat(points: NDArray[np.float64]) -> bool:
     """Whether the nodes of a piece do not span space, so that no element there has a volume."""
     return len(points) > 0 and np.linalg.matrix_rank(points - points.mean(axis=0), rtol=ALIKE) < points.shape[1]
-
-
-_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
-
-
-def _cell_fields(found: Cells) -> dict[str, Any]:
-    """Corners of the cells by their name in a Body, their further nodes, and in the plane their boundary."""
-    fields = {}
-    for name, cells in found.blocks.items():
-        kind = KINDS[name]
-        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
-        if kind.quadratic:
-            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
-    if any(KINDS[name].dim == 2 for name in found.blocks):
-        fields["boundary"], fields["boundary_offsets"] = boundary_loops(found.blocks)
-    return fields
 
 
 def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:
