@@ -143,19 +143,15 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
-    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
+    """The number lambda / mu as boundary terms have it, or elements that told the axes of all pieces; None if none is.
 
-    None too where more than translation and scale is free, since boundary terms go with the points.
+    Boundary terms go with the points, of which nothing but translation and scale may be free.
     """
-    if any(solution.freedoms):
+    if any(solution.freedoms) or 0 < len(solution.straight) < len(solution.evidence):
         return None
-    told = list(solution.straight)
-    if len(solution.straight) < len(solution.evidence):
-        read = lame_ratio(nodal, solution.valid, solution.points)
-        if read is None:
-            return None
-        told.append(read)
-    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
+    if not solution.straight:
+        return lame_ratio(nodal, solution.valid, solution.points)
+    return solution.straight[0] if np.ptp([poisson_ratio(one) for one in solution.straight]) < ALIKE else None
 
 
 def _flat(points: NDArray[np.float64]) -> bool:
