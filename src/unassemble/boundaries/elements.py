@@ -9,27 +9,32 @@ with less and less weight; in the end it is what the mesh itself has there, so t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import islice
+from dataclasses import dataclass, replace
+from itertools import combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..conforming.joined import JoinedParts
+from ..conforming.affine import expected
+from ..conforming.fit import Fitted, by_rule, corner_positions
 from ..conforming.parts import Part, parts_of
-from ..conforming.recover import shown_cells
-from ..errors import TopologyError
+from ..conforming.recover import JoinedParts, shown_cells
+from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
+from ..planar.polish import PolishOptions, polish
 from ..recovery import ConformingMesh
 from ..scalar.placement import Placement
-from ..tolerances import CERTIFIED, ROUNDED
+from ..tolerances import ALIKE, CERTIFIED, LITTLE, ROUNDED, SMALL
 from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
-from .guessed import FittedPart, fitted_part
-from .judge import node_status, partly, unknowns
+from .fit import EXACT
+from .judge import determined_by, node_status, partly, unknowns
 
 _MOST = 3  # sets of cells, the likeliest ones
+_AT_FIRST, _THEN = (1.0, 0.1, 0.01), (1e-3, 1e-4, *[1e-5] * 5)  # weights of what is guessed
+_TO_THE_END = PolishOptions(settled=0.0)  # misfits of guesses are no noise
 
 
 def recover_partial_elements(
@@ -102,3 +107,106 @@ def _report(
         timings=clock.timings,
         warnings=(*matrix.warnings, *said, *mesh.notes, *loose),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPart:
+    """A part whose whole entries fit."""
+
+    fit: Fitted
+    known: NDArray[np.bool_]  # (corners,) that are determined
+    whole: NDArray[np.bool_]  # (e,) pairs of the part
+    used: NDArray[np.bool_]  # (e,) that determine and check what is known
+    twins: NDArray[np.bool_]  # (n,) nodes that could change places with another one
+
+    @property
+    def known_nodes(self) -> NDArray[np.bool_]:
+        """(n,) nodes between known corners that are told from each other."""
+        return np.asarray((self.fit.part.from_corners() @ ~self.known == 0) & ~self.twins)
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """(e,) whole entries of cells whose corners are all known."""
+        loose = np.zeros(len(self.whole), dtype=bool)
+        for kind, cells in self.fit.part.blocks.items():
+            loose[self.fit.part.places[kind][~self.known[cells[:, : kind.corners]].all(axis=1)]] = True
+        return self.whole & ~loose
+
+
+def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], scale: float | None) -> FittedPart | None:
+    """The part with positions that have its whole entries; None where none are found."""
+    place, there = part.stored_in(matrix)
+    weights = -np.where(there, matrix.entries[place], 0.0)
+    count, most = np.zeros((2, len(weights)), dtype=np.int64)
+    for kind, places in part.places.items():
+        count += np.bincount(places.ravel(), minlength=len(weights))
+        most[places] = np.where(kind.on_one_side, 2, 1)
+    alone = near[part.rows].all(axis=1)  # entries of which other cells may have a part
+    whole = np.asarray(~alone | (count == most) if matrix.replaced is None else ~alone)
+    if whole.sum() <= 2 * part.n_corners - 3:
+        return None
+    trust = np.where(whole, np.where(count == 1, 1.0, LITTLE**2), np.where(there, SMALL, 0.0))
+    shared = expected(part.places, weights / count, trust)
+    for guess in (np.where(whole, weights, shared), np.where(whole, weights, weights / 2)):
+        try:
+            start, c = corner_positions(part, guess, None)  # the energy of guesses is not that of c
+        except (GeometryError, SolverError):
+            continue
+        rules = list(by_rule(part, guess, start, c))  # much alike: which it is shows near the end
+        begun = _faded(rules[0], whole, _AT_FIRST, scale)
+        trials = [_faded(replace(begun, entries=one.entries, rule=one.rule), whole, _THEN[:1], scale) for one in rules]
+        for near_end in sorted(trials, key=lambda one: _size(one, whole))[:2]:
+            fit = _faded(near_end, whole, _THEN, scale)
+            if not _size(fit, whole) <= EXACT or fit.entries.flipped(fit.z):
+                continue
+            w = fit.entries.weights(fit.z)
+            jacobian = fit.entries.jacobian(fit.z, np.ones(len(w))).matrix
+            slopes = np.zeros((len(w), 0)) if scale is not None else w[:, None]
+            known, used, _ = determined_by(jacobian, slopes, whole, fit.z, part.piece, fit.misfit / fit.scale)
+            twins = _twins(part, weights / fit.scale, whole, near[part.piece.vertices])
+            known &= ~twins[: part.n_corners]
+            return FittedPart(fit, known, whole, used, twins)
+    return None
+
+
+def _twins(part: Part, weights: NDArray, whole: NDArray[np.bool_], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) nodes `near` what is lost that have the same whole entries as another one of the same cells."""
+    times = np.bincount(np.concatenate([cells.ravel() for cells in part.blocks.values()]), minlength=part.n)
+    alike = []
+    for kind, cells in part.blocks.items():
+        k = kind.nodes
+        own, given = np.zeros((len(cells), k, k)), np.zeros((len(cells), k, k), dtype=bool)
+        for i, j in (np.triu_indices(k, 1), np.triu_indices(k, 1)[::-1]):
+            own[:, i, j], given[:, i, j] = weights[part.places[kind]], whole[part.places[kind]]
+        for a, b in combinations(range(k), 2):
+            others = [c for c in range(k) if c not in (a, b)]
+            differ = np.where(given[:, a] | given[:, b], np.abs(own[:, a] - own[:, b]), 0.0)[:, others].max(axis=1)
+            alike.append(np.sort(cells[differ <= ALIKE][:, [a, b]], axis=1))
+    pairs, count = np.unique(np.concatenate(alike), axis=0, return_counts=True)
+    one, other = pairs.T
+    some = near[one] & near[other] & (count == times[one]) & (count == times[other])
+    twins = np.zeros(part.n, dtype=bool)
+    twins[one[some]] = twins[other[some]] = True
+    return twins
+
+
+def _size(fit: Fitted, whole: NDArray[np.bool_]) -> float:
+    """Root mean square misfit of whole entries, relative to c."""
+    return float(np.sqrt(np.mean((fit.misfit / fit.scale)[whole] ** 2)))
+
+
+def _faded(start: Fitted, whole: NDArray[np.bool_], fading: Sequence[float], scale: float | None) -> Fitted:
+    """One fit after the other, with such weights of what is guessed; small ones only hold the mesh where it is."""
+    fit = start
+    for weight in fading:
+        spread = np.where(whole, 1.0, 1 / weight)
+        try:
+            found = polish(fit.entries, fit.weights, fit.z, scale=scale, spread=spread, options=_TO_THE_END)
+        except SolverError:
+            break
+        own = found.scale * fit.entries.weights(found.z)
+        new = replace(fit, z=found.z, scale=found.scale, misfit=fit.weights - own)
+        if not np.isfinite(_size(new, whole)) or (weight == _THEN[-1] and _size(new, whole) > _size(fit, whole) / 2):
+            break
+        fit = replace(new, weights=np.where(whole, fit.weights, own)) if weight <= SMALL else new
+    return fit

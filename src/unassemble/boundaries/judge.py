@@ -1,17 +1,13 @@
 """Which vertices the whole entries determine, and check.
 
 Displacements that change no whole entry, to first order, are the null space of their Jacobian J, the logarithm of c
-taken along. Similarities are in it, of a piece as a whole; what else there is moves the vertices that are not
-determined.
+taken along: similarities of a piece as a whole, and what moves the vertices that are not determined. An entry that
+belongs to no dependency y'J = 0 fits whatever it is, and what hangs on such entries is no more than plausible. They
+show in random vectors from which their image under J was taken: what is left there is zero.
 
-That is not enough: as many equations as unknowns may have several solutions, and an entry that belongs to no dependency
-among the rows of J, y'J = 0, fits whatever it is. What hangs on such entries is no more than plausible. They show in
-random vectors from which their image under J was taken: what is left there is zero.
-
-So what moves a vertex is a displacement d with J d zero but for unchecked entries, where it is anything. If one does,
-then so does a random one, with probability one: that solves J d = r, with r random there, and x -> x + (J'J)^-1 J'(r -
-J x) leads to it from a random start. A basis of these displacements, one for each vertex that is not determined, is not
-needed, and one factorisation is all there is.
+So what moves a vertex is a displacement d with J d = r, r anything at unchecked entries and zero elsewhere. If one
+does, then so does a random one, with probability one: x -> x + (J'J)^-1 J'(r - J x) leads to it from a random start,
+with one factorisation and no basis of all of them.
 """
 
 from __future__ import annotations

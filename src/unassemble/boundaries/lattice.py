@@ -1,13 +1,10 @@
 """A grid continued beyond the rows of the matrix: parallelograms in rows and columns, or halves of these.
 
-Each row and column of cells has a size of its own, and all have the same angles. If G is c sqrt(det g) times the
-inverse of the metric g of a cell, then with steps h_i and k_j G11 = s k_j / h_i, G22 = s h_i / k_j and G12 = t are its
-entries, s and t the same in all cells, and c^2 = s^2 - t^2. Those of the matrix are linear in G. Diagonals give t, and
-an edge along x with half of all entries on diagonals of the cells beside it is -s (k_{j-1} + k_j) / (2 h_i), whether
-elements are bilinear, or linear on halves. Such edges, and those along y, are products of what depends on i and what
-depends on j; each gives the steps up to a factor, and sums of two steps say what these factors are. Steps beyond the
-rows show in the entries along the rim, and so does which cells there are: each of two on an edge has a part of its
-entry. Corners of cells that are no rows were vertices of a boundary that is gone.
+If G is c sqrt(det g) times the inverse of the metric g of a cell, then with steps h_i and k_j G11 = s k_j / h_i, G22 =
+s h_i / k_j and G12 = t, s and t the same in all cells, c^2 = s^2 - t^2. Entries are linear in G: diagonals give t, and
+an edge along x with half of all entries on diagonals beside it is -s (k_{j-1} + k_j) / (2 h_i), a product of what
+depends on i and on j. So is one along y; each gives steps up to a factor, which sums of two steps settle. Steps beyond
+the rows, and which cells there are, show in the entries along the rim.
 """
 
 from __future__ import annotations

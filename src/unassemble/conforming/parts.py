@@ -85,33 +85,27 @@ def parts_of(shown: Cells) -> list[Part]:
         corner[cells[:, : kind.corners]], between[cells[:, kind.corners :]] = True, True
     if (corner & between).any():
         raise TopologyError("rows are corners of some cells and lie between corners of others")
-    triangles, owner = _divided(blocks)
+    halves = [0, 1, 2, 0, 2, 3]
+    triangles = np.concatenate([cells[:, halves[: 3 * k.corners - 6]].reshape(-1, 3) for k, cells in blocks.items()])
     edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
     pieces = planar_pieces(n, edges, triangles, opposite)
     if not pieces:
         raise TopologyError("the cells that the rows form do not glue together to a surface in the plane")
     label = np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)  # the sum of three tells a triangle
     glued = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
-    row = np.empty(len(glued), np.int64)
-    row[np.argsort(label[glued].sum(axis=1))] = np.argsort(label[triangles].sum(axis=1))
-    which, turned = np.empty(len(triangles), np.int64), np.empty(len(triangles), dtype=bool)
-    which[row] = np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces])
-    start = (glued == triangles[row, :1]).argmax(axis=1)
-    turned[row] = glued[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
-    oriented, piece_of, first = {}, {}, 0
+    owner = np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces])
+    key = label[glued].sum(axis=1)
+    order = np.argsort(key)
+    own: list[Blocks] = [{} for _ in pieces]
     for kind, cells in blocks.items():
-        representative = first + np.flatnonzero(np.diff(owner[first:], prepend=-1) != 0)[: len(cells)]
-        flip = turned[representative]
-        oriented[kind] = np.where(flip[:, None], cells[:, reversal(kind)], cells)
-        piece_of[kind] = which[representative]
-        first += len(cells) * (kind.corners - 2)
-    return sorted(
-        (
-            _part(shown.order, piece, {kind: cells[piece_of[kind] == k] for kind, cells in oriented.items()})
-            for k, piece in enumerate(pieces)
-        ),
-        key=lambda part: int(part.piece.vertices.min()),
-    )
+        place = order[np.searchsorted(key, label[cells[:, :3]].sum(axis=1), sorter=order)]
+        start = (glued[place] == cells[:, :1]).argmax(axis=1)
+        turned = glued[place, (start + 1) % 3] != cells[:, 1]
+        oriented = np.where(turned[:, None], cells[:, reversal(kind)], cells)
+        for k, some in enumerate(own):
+            some[kind] = oriented[owner[place] == k]
+    parts = [_part(shown.order, piece, some) for piece, some in zip(pieces, own, strict=True)]
+    return sorted(parts, key=lambda part: int(part.piece.vertices.min()))
 
 
 def reversal(kind: Kind) -> list[int]:
@@ -119,17 +113,6 @@ def reversal(kind: Kind) -> list[int]:
     corner = [0, *range(kind.corners - 1, 0, -1)]
     between = [tuple(sorted(some)) for some in kind.between]
     return corner + [kind.corners + between.index(tuple(sorted(corner[c] for c in some))) for some in kind.between]
-
-
-def _divided(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles between corners, two for each quadrilateral, and the cell of each."""
-    triangles, owner, first = [], [], 0
-    for kind, cells in blocks.items():
-        halves = [[0, 1, 2]] if kind.corners == 3 else [[0, 1, 2], [0, 2, 3]]
-        triangles.append(cells[:, halves].reshape(-1, 3))
-        owner.append(first + np.repeat(np.arange(len(cells)), len(halves)))
-        first += len(cells)
-    return np.concatenate(triangles), np.concatenate(owner)
 
 
 def _part(order: NDArray[np.int64], piece: Piece, blocks: Blocks) -> Part:

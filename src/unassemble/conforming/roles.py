@@ -138,7 +138,7 @@ def _trials(
             some = np.flatnonzero(fits & (pattern == code))
             none = np.zeros((len(some), kind.corners, kind.degree - 1), np.int64)
             between = sides.between[place[some]] if none.size and len(sides.keys) else none
-            local = _local(sets[some], between)
+            local = (sets[some][:, None, None] == between[..., None]).argmax(axis=-1).reshape(len(some), -1)
             for fill in _fillings(kind, known[some[0]]):
                 on_sides = [open_rows[some, f - 100] if f >= 100 else local[:, f] for f in fill]
                 yield some, np.column_stack([around[some], *on_sides, inner[some]])
@@ -164,15 +164,6 @@ def _parted(
     np.put_along_axis(free, inner, False, axis=1)
     open_rows = np.argsort(~free, axis=1, kind="stable")
     return corners, inner, open_rows, free.sum(axis=1)
-
-
-def _local(sets: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Places of rows (m, c, r) in their sets."""
-    return np.stack(
-        [(sets == rows[:, s, r, None]).argmax(axis=1) for s in range(rows.shape[1]) for r in range(rows.shape[2])]
-        or [np.empty(len(sets), np.int64)],
-        axis=1,
-    )
 
 
 def _fillings(kind: Kind, known: NDArray[np.bool_]) -> list[tuple[int, ...]]:

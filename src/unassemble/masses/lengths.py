@@ -1,14 +1,10 @@
 """Areas of triangles from the entries of c L + s M: squared lengths of all edges, and c, by Levenberg-Marquardt.
 
-In units of length in which s = 1, with w the weights of the Laplacian and a the areas,
-
-    -A_ij = c w_ij - (sum of a over the triangles of ij) / 12,      (A 1)_i = (sum of a over the triangles at i) / 3.
-
-These are e + n equations for e + 1 unknowns, and local: row sums tell sizes where they stand, so that no smooth
-deformation of the whole mesh has to be found, and some seven steps do at any number of vertices. The weights of a
-triangle with small angles are inversely proportional to its area; what is compared is 2 w / sqrt(1 + 4 w^2), for a
-single triangle the cosine of the angle, which is linear in the square of the side that faces it: no step overshoots
-there.
+In units of length in which s = 1, with w the weights of the Laplacian and a the areas, -A_ij = c w_ij - (sum of a over
+the triangles of ij) / 12, and (A 1)_i = (sum of a over the triangles at i) / 3: e + n equations for e + 1 unknowns, and
+local, so that some seven steps do at any number of vertices. The weights of a triangle with small angles are inversely
+proportional to its area; what is compared is 2 w / sqrt(1 + 4 w^2), for a single triangle the cosine of the angle,
+which is linear in the square of the side that faces it: no step overshoots there.
 """
 
 import logging

@@ -34,13 +34,7 @@ def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, Cells, Weights] |
 
 
 def settled(
-    held: Held,
-    start: Weights,
-    blocks: Blocks,
-    plain: Callable[[OperatorMatrix], PlanarMesh],
-    *,
-    patience: int = 9,
-    told: bool = False,
+    held: Held, start: Weights, blocks: Blocks, plain: Callable[[OperatorMatrix], PlanarMesh], patience: int, told: bool
 ) -> PlanarMesh | None:
     """The mesh whose mass matrix, taken off, leaves its Laplacian; the nearest where there is none.
 

@@ -2,10 +2,10 @@
 
 from .flat import could_be_planar, flattened, perhaps_planar, unless_planar
 from .heron import angles, areas_cotangents, heron, longest_step
-from .noise import length_deviations
 from .program import solve_metric
 from .realise import realised
 from .recover import recover_surface
+from .verdict import length_deviations
 
 __all__ = [
     "angles",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -14,13 +15,14 @@ from ..errors import GeometryError, RecoveryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import Surface
+from ..topology.cycles import three_cycles
+from ..topology.keys import pair_keys
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
+from ..topology.numbering import connected
 from ..words import count_of
 from .mesh import SurfaceMesh
-from .noise import length_deviations, row_sum_test
 from .program import Metric, solve_metric
-from .taken_out import with_vertices_back
-from .verdict import READINGS, Found, Verdict, judged
+from .verdict import READINGS, Found, Verdict, judged, length_deviations, row_sum_test
 
 
 def recover_surface(
@@ -153,4 +155,34 @@ def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, devi
         loops=mesh.loops,
         chi_square=found.sums,
         length_deviations=deviations,
+    )
+
+
+def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
+    """The matrix with a last row for each hole that one vertex may have left; None where there is no such hole.
+
+    Rows of a Laplacian add up to zero. If all of a boundary loop do not, and others do, they lack entries; and where a
+    single vertex is gone these are its own. A loop with more rows than any other row has neighbours is not closed so.
+    """
+    n, edges, lacking = matrix.n, matrix.edges, matrix.incomplete_rows
+    _, opposite = three_cycles(n, edges)
+    rim = edges[lacking[edges].all(axis=1) & (np.bincount(opposite.ravel(), minlength=len(edges)) == 1)]
+    loop = connected(n, *rim.T)[1]
+    twice = np.bincount(rim.ravel(), minlength=n) == 2
+    degree = np.bincount(edges.ravel(), minlength=n)
+    closed = (np.bincount(loop, ~twice) == 0) & (np.bincount(loop) <= degree[~lacking].max(initial=0))
+    rows = np.flatnonzero(closed[loop])
+    if not len(rows):
+        return None
+    _, gone = np.unique(loop[rows], return_inverse=True)
+    sums = matrix.row_sums[rows]
+    more = np.column_stack([rows, n + gone])
+    total = n + int(gone.max()) + 1
+    order = np.argsort(pair_keys(total, *np.vstack([edges, more]).T))
+    return replace(
+        matrix,
+        n=total,
+        edges=np.vstack([edges, more])[order],
+        entries=np.append(matrix.entries, -sums)[order],
+        diagonal=np.append(matrix.diagonal, np.bincount(gone, sums)),
     )

@@ -1,10 +1,9 @@
 """Triangles that belong to the region beside them: what the misfit of a fit shows, geometry taken out.
 
-Changing triangle t to a region with another factor adds a column b_t to the linearised problem, with entries at its
-three sides. Displacements and factors take up what they can: with the projection P from their columns, the changes are
-those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)| least, r the misfit; about 0 where nothing changes, and
-about 1 where something does. All that is wrong shows at once, as far as it is small. Beside a rim, which takes up much
-of anything, too many do, and changes are first made one by one, of all of b_t: always the one that takes most off the
+Changing triangle t to a region with another factor adds a column b_t to the linearised problem. With the projection P
+from what displacements and factors take up, changes are those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)|
+least, r the misfit: all that is wrong shows at once, as far as it is small. Beside a rim, which takes up much of
+anything, too many do, and changes are first made one by one, of all of b_t: always the one that takes most off the
 squares of what is left of the misfit, 2 r'P b_t - |P b_t|^2, as long as any does.
 """
 
