@@ -14,7 +14,7 @@ from ..cells import SEARCHED_ROWS, Alternative
 from ..certify import Certificate
 from ..certify_elements import certify_elements
 from ..clock import Clock
-from ..elements.surface import boundary_loops
+from ..elements.surface import fields_of
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -264,17 +264,8 @@ class JoinedParts:
 
     def fields(self) -> dict[str, Any]:
         """What results say of the mesh, under the names that they have for it."""
-        fields: dict[str, Any] = {}
-        for name, cells in self.blocks.items():
-            corners = 3 if name.startswith("triangle") else 4
-            fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])
-            if cells.shape[1] > corners:
-                fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
-        boundary, offsets = boundary_loops(self.blocks)
-        return fields | {
+        return fields_of(self.blocks) | {
             "points": self.written,
-            "boundary": boundary,
-            "boundary_offsets": offsets,
             "component": self.component,
             "hinges": self._topology.hinges,
             "scale": np.array([fit.scale for fit in self._fits]) / self._stretch,

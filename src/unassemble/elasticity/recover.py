@@ -1,14 +1,12 @@
 """Coordinates from an elasticity matrix: the whole room on one page."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elements.kinds import KINDS
-from ..elements.surface import boundary_loops
+from ..elements.surface import fields_of
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..nodes.anchoring import Request, anchored
@@ -113,7 +111,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         notes.append("all nodes are coupled, as those of one element: which rows are of one node may be another choice")
     guessed = guessed_directions(numbering, loose)
     return Body(
-        **_cell_fields(shown),
+        **fields_of(shown.blocks),
         points=points,
         component=component,
         scale=scale,
@@ -145,40 +143,20 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
-    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
+    """The number lambda / mu as boundary terms have it, or elements that told the axes of all pieces; None if none is.
 
-    None too where more than translation and scale is free, since boundary terms go with the points.
+    Boundary terms go with the points, of which nothing but translation and scale may be free.
     """
-    if any(solution.freedoms):
+    if any(solution.freedoms) or 0 < len(solution.straight) < len(solution.evidence):
         return None
-    told = list(solution.straight)
-    if len(solution.straight) < len(solution.evidence):
-        read = lame_ratio(nodal, solution.valid, solution.points)
-        if read is None:
-            return None
-        told.append(read)
-    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
+    if not solution.straight:
+        return lame_ratio(nodal, solution.valid, solution.points)
+    return solution.straight[0] if np.ptp([poisson_ratio(one) for one in solution.straight]) < ALIKE else None
 
 
 def _flat(points: NDArray[np.float64]) -> bool:
     """Whether the nodes of a piece do not span space, so that no element there has a volume."""
     return len(points) > 0 and np.linalg.matrix_rank(points - points.mean(axis=0), rtol=ALIKE) < points.shape[1]
-
-
-_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
-
-
-def _cell_fields(found: Cells) -> dict[str, Any]:
-    """Corners of the cells by their name in a Body, their further nodes, and in the plane their boundary."""
-    fields = {}
-    for name, cells in found.blocks.items():
-        kind = KINDS[name]
-        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
-        if kind.quadratic:
-            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
-    if any(KINDS[name].dim == 2 for name in found.blocks):
-        fields["boundary"], fields["boundary_offsets"] = boundary_loops(found.blocks)
-    return fields
 
 
 def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:

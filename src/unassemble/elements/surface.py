@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def _bounding_twice(facets: NDArray[np.int64]) -> NDArray[np.bool_]:
     return _repeated(_labels(facets, 2 * np.arange(r, dtype=np.uint64) + np.uint64(1)))
 
 
-def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(b, 2) directed boundary edges of planar cells loop by loop, and (loops + 1,) where each loop begins.
 
     Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
@@ -130,3 +131,19 @@ def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]
     successor[np.argsort(edges[:, 1], kind="stable")] = np.argsort(edges[:, 0], kind="stable")
     loop, order = loops(successor)
     return edges[order], np.append(np.flatnonzero(np.diff(loop[order], prepend=-1)), len(order)).astype(np.int64)
+
+
+_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def fields_of(blocks: Blocks) -> dict[str, Any]:
+    """Corners of cells by their names in results, (m, k), their further nodes, and in the plane their boundary."""
+    fields: dict[str, Any] = {}
+    for name, cells in blocks.items():
+        kind = KINDS[name]
+        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
+        if kind.quadratic:
+            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
+    if any(KINDS[name].dim == 2 for name in blocks):
+        fields["boundary"], fields["boundary_offsets"] = _boundary_loops(blocks)
+    return fields

@@ -48,14 +48,13 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     w, t, steps = _members(off)
     deflections, partner = np.unique(w), np.full(order, -1)
     partner[w] = t
-    if (partner[w] != t).any():
-        return None  # one deflection with two rotations
     rotations = partner[deflections]
     node = np.full(order, -1)
     node[deflections] = node[rotations] = np.arange(len(deflections))
     direction = np.full(order, -1)
     direction[rotations], direction[deflections] = 2, 1
-    if not len(deflections) or len(np.unique(rotations)) < len(rotations) or np.isin(rotations, deflections).any():
+    once = len(np.unique(rotations)) == len(rotations) > 0 and not np.isin(rotations, deflections).any()
+    if not once or (partner[w] != t).any():  # each deflection has one rotation
         return None
     members, steps = _with_ends(off, node, direction, node[w], steps)
     n = int(node.max()) + 1

@@ -89,7 +89,7 @@ def mispaired(
         excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
         strange |= twins | (whole & ~balances & ~excused)
     strange &= known[first] | known[second]
-    k = int(np.argmax(strange)) if strange.any() else None
+    k = np.argmax(strange) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
 
 

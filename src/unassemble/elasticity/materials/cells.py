@@ -80,14 +80,10 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     graph, known = coupled(nodal, points), determined(points)
     likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
     found = Cells()
-    # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
-    unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(
-            points, graph, replace(entries, value=entries.value / unit, size=entries.size / unit), ratio
-        )
+        other = _recognised(points, graph, entries, ratio)
         if other.certified:
-            return replace(other, lame=other.lame * unit)
+            return other
         found = found if found.recognised else other
     return found
 
