@@ -10,6 +10,7 @@ from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
 from .first import LARGE, first_fits, nearest_conformal
 from .fit import EXACT, Fit, FitOptions, WholeEntries
+from .grow import grow
 from .judge import determined, unknowns
 from .lengths import fit_lengths
 from .patch import distance, fit_anew, fit_near, moved_along
@@ -91,6 +92,8 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
                 held = determined(problem, fit.z, fit.scale, rim.whole)[0]
             before = rim.whole.sum()
             fit, rim = _grown(problem, fit, rim, held)
+        if rim.whole.sum() < enough:
+            fit, rim = _grown_by_sets(problem, fit, rim)
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
     if exact:
         known, entries, step = determined(problem, fit.z, fit.scale, rim.whole)
@@ -203,4 +206,17 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
             if fit.misfit <= EXACT:
                 return fit, grown
     fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+    return (fit, grown) if fit.misfit <= EXACT else (core, rim)
+
+
+def _grown_by_sets(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
+    """What grows by small sets from vertices that a core determines, and fits as a whole; else the core."""
+    piece, held = problem.piece, determined(problem, core.z, core.scale, rim.whole)[0]
+    every = replace(rim, left=np.ones_like(rim.left))
+    z, known = grow(problem, core.z, core.scale, every.whole, held)
+    if known.sum() == held.sum():
+        return core, rim
+    grown = replace(rim, left=np.asarray(known[piece.triangles].all(axis=1)))
+    several = FitOptions(last_steps=3, trials=1, damping=1e-15, exact=0.0)  # what was near by itself is not in all
+    fit = problem.fit(z, core.scale, grown.whole, 0.0, several)
     return (fit, grown) if fit.misfit <= EXACT else (core, rim)
