@@ -67,7 +67,8 @@ def certify(
     """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries; with further terms all.
 
     `edges` (e, 2): pairs i < j of the matrix; `entries` (e,): A_ij; `points` (n, 2); `triangles` (m, 3); `factor` (m,):
-    the factor c of each triangle's piece; `tensor`: kxx, kxy and kyy of K, the identity by default.
+    the factor c of each triangle's piece; `tensor`: kxx, kxy and kyy of K, the identity by default; `terms`: what the
+    matrix has besides, where it has.
     """
     kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
     corners = [np.ascontiguousarray(column) for column in triangles.T]

@@ -105,8 +105,14 @@ def recover(
     Returns
     -------
     Recovery
-        Certified or not; look at ``status``. Raises InputError for options that contradict each other and files that
-        cannot be read, RecoveryError if no mesh can be recovered from this matrix.
+        Certified or not; look at ``status``.
+
+    Raises
+    ------
+    InputError
+        For options that contradict each other, and files that cannot be read.
+    RecoveryError
+        If no mesh can be recovered from this matrix.
 
     Examples
     --------

@@ -77,6 +77,8 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     differ = [
         tuple(mine[key] for key in sorted(mine, key=sorted) if key not in theirs) for mine, theirs in (rows, rows[::-1])
     ]
+    if not any(differ):  # the same sets in other orders
+        differ = [tuple(sorted(mine.values())) for mine in rows]
     reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
     return replace(
         one,

@@ -156,7 +156,10 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
 
 def _flat(points: NDArray[np.float64]) -> bool:
     """Whether the nodes of a piece do not span space, so that no element there has a volume."""
-    return len(points) > 0 and np.linalg.matrix_rank(points - points.mean(axis=0), rtol=ALIKE) < points.shape[1]
+    if not len(points):
+        return False
+    values = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(values[-1] <= ALIKE * values[0])
 
 
 def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:

@@ -1,10 +1,22 @@
 """Edge lengths from cotangent weights: a convex program, followed along its central path, and Newton's method.
 
-Weights c w of edges, half the sum of the cotangents facing them, are the derivatives of twice the sum of all areas S_t
-by squared lengths u. So u maximises sum_t S_t(u) subject to w . u = 1, every S_t >= 0 in a cone, and nothing else does
-but for size (Gu, Guo, Luo, Zeng, "Discrete Laplace-Beltrami operator determines discrete Riemannian metric",
-arXiv:1010.4070, 2010). With slacks and a logarithmic barrier mu in each cone (Boyd, Vandenberghe, "Convex
-Optimization", 2004, chapter 11) S is sqrt(mu^2 + S^2) + mu log(sqrt(mu^2 + S^2) - mu), while mu goes to 0.
+By Heron's formula the area S_t of a triangle is a concave function of its squared side lengths u, homogeneous of degree
+one, and its derivative by a side is a quarter of the cotangent of the angle facing it. So weights of edges, half the
+sum of the cotangents facing them, are the gradient of twice the sum of all areas, and the metric with given weights c w
+solves, uniquely but for its size (Gu, Guo, Luo, Zeng 2010),
+
+    maximise  sum_t S_t(u)   subject to   w . u = 1 ,
+
+with every triangle in the cone S_t(u) >= 0. Nothing is assumed of the surface.
+
+A slack for each area and the logarithmic barrier of the second-order cone, max over s of s + mu log(S^2 - s^2), give
+phi(S) = sqrt(mu^2 + S^2) + mu log(sqrt(mu^2 + S^2) - mu), up to a constant: the central path maximises the sum of these
+while mu goes to 0. Its Newton steps have one unknown for each edge, and the matrix couples edges of one triangle only.
+
+References
+----------
+Gu, Guo, Luo, Zeng, "Discrete Laplace-Beltrami operator determines discrete Riemannian metric", arXiv:1010.4070, 2010.
+Boyd, Vandenberghe, "Convex Optimization", Cambridge 2004, chapter 11.
 """
 
 from dataclasses import dataclass

@@ -149,7 +149,7 @@ def known_to(
     `place` finds points and their misfits (m,) from a matrix that may have been rounded to the given one; `sized` says
     whether the matrix tells size and sign.
     """
-    pieces = [np.flatnonzero(component == one) for one in range(component.max(initial=-1) + 1)]
+    pieces = [np.flatnonzero(component == one) for one in np.unique(component[component >= 0])]
     moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))
     try:
         for seed in range(REDRAWN):

@@ -60,6 +60,8 @@ def lacking_term(
         both -= direction[:, None] * (direction @ both)
     misfit, columns = both[:, 0], both[:, 1:-1]
     total = float(misfit @ misfit)
+    if not total > 0:
+        return None
     share = _explained(misfit, columns) / total
     ratio = (share / count) / max((1 - share) / (freedom - count), np.finfo(float).tiny)
     kinds = {name: np.flatnonzero(names[:count] == name) for name in dict.fromkeys(names[:count].tolist())}

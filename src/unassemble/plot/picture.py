@@ -80,11 +80,14 @@ def plot_comparison(true_points: ArrayLike, recovery: PlanarMesh, path: str | os
 
     Row i of `true_points`, (n, 2) array_like, belongs to matrix row i; `path` is as in :func:`plot_recovery`.
 
-    Raises InputError if `true_points` has another shape; OutputError if the file cannot be written.
+    Raises InputError if `true_points` has another shape, or `recovery` is no planar mesh; OutputError if the file
+    cannot be written.
     """
     if path is not None:
         check_plot(path)
     truth = np.asarray(true_points, dtype=np.float64)
+    if not isinstance(recovery, PlanarMesh):
+        raise InputError("only planar meshes are drawn beside the true ones")
     if truth.shape != recovery.points.shape:
         raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
     aligned = align(recovery.points, truth, recovery.component)

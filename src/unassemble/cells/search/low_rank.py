@@ -62,7 +62,7 @@ class ChangedMaps:
         self._columns = np.empty((0, self._n), dtype=np.complex128)
 
     def after(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> NDArray[np.complex128]:
-        """(n, moves) positions after each move; NaN, for all of them, where a changed pencil is singular."""
+        """(n, moves) positions after each move; NaN where the changed pencil is singular."""
         corner, after, before, side = self._sides(labels, moves)
         new = np.unique(corner)
         new = new[self._place[new] < 0]
@@ -81,10 +81,7 @@ class ChangedMaps:
         changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
         ahead = self._z + self._shift * self._y
         rhs = (side * (ahead[after] - ahead[before]))[..., None]
-        try:
-            q = np.linalg.solve(changed, rhs)[..., 0]
-        except np.linalg.LinAlgError:  # one that is singular ends all
-            return np.full((self._n, len(moves)), np.nan, dtype=np.complex128)
+        q = _solved(changed, rhs)[..., 0]
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )
@@ -107,3 +104,12 @@ class ChangedMaps:
         side = np.zeros(corner.shape, dtype=np.complex128)
         side[row, slot] = np.where(labels[cell], 0.25j, -0.25j)[owner]
         return corner, after, before, side
+
+
+def _solved(matrices: NDArray, rhs: NDArray) -> NDArray[np.complex128]:
+    """Solutions of many small systems; NaN where one is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, rhs))
+    except np.linalg.LinAlgError:  # the end of all others, too
+        singular = np.linalg.det(matrices) == 0
+        return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrices), rhs))

@@ -122,7 +122,7 @@ def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float)
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
-    if not misfit <= CERTIFIED or not lame.any():
+    if not (misfit <= CERTIFIED and lame.any() and np.isfinite(lame).all()):
         return None
     carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
     parts = np.split(carries, np.cumsum([len(one.cells) for one in blocks])[:-1])
