@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
-from ..planar.polish import SHORT, polish
+from ..planar.polish import CAREFUL, SHORT, polish
 from ..tolerances import ALIKE, SMALL
 from ..topology import Piece, Topology
 from ..topology.numbering import connected
@@ -27,11 +27,14 @@ Attempt = Callable[[Piece], Outcome]
 Solved = list[tuple[Piece, Outcome]]
 
 
-def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None) -> NDArray[np.bool_]:
+def in_doubt(
+    matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None, noise: float | None
+) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
-    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known.
+    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known,
+    and `noise` the standard deviation of the entries' errors.
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
@@ -41,7 +44,7 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale
     wrong = misfit > ALIKE
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
-    solved = [(piece, _shortly_polished(matrix, piece, mesh, scale)) for piece, mesh in solved]
+    solved = [(piece, _shortly_polished(matrix, piece, mesh, scale, small_steps=bool(noise))) for piece, mesh in solved]
     if _like_noise(misfits(matrix.n, matrix.edges, -matrix.entries, solved)[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
@@ -55,13 +58,15 @@ def _like_noise(misfit: NDArray, n: int) -> bool:
     return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SMALL)
 
 
-def _shortly_polished(matrix: OperatorMatrix, piece: Piece, mesh: Outcome, scale: float | None) -> Outcome:
-    """By a few steps."""
+def _shortly_polished(
+    matrix: OperatorMatrix, piece: Piece, mesh: Outcome, scale: float | None, *, small_steps: bool
+) -> Outcome:
+    """By a few steps; by small ones where noise may lead large ones to flat triangles."""
     if not isinstance(mesh, PieceMesh):
         return mesh
     weights = -matrix.entries[piece.edge_rows]
     try:
-        found = polish(piece, weights, mesh.z, scale=scale, options=SHORT)
+        found = polish(piece, weights, mesh.z, scale=scale, options=CAREFUL if small_steps else SHORT)
     except SolverError as error:
         return error
     return PieceMesh(found.z, found.scale)

@@ -8,9 +8,10 @@ from .hinges import join
 from .normal import WeightJacobian
 from .pencil import ConformalPencil, ShiftedSearch
 from .piece import PieceMesh, collapsed, refined
-from .polish import PolishOptions, polish
+from .polish import CAREFUL, PolishOptions, count_flipped, polish
 
 __all__ = [
+    "CAREFUL",
     "ConformalOptions",
     "ConformalPencil",
     "PieceMesh",
@@ -21,6 +22,7 @@ __all__ = [
     "collapsed",
     "collinear",
     "conformal_map",
+    "count_flipped",
     "covariances",
     "edge_weights",
     "estimate_scale",

@@ -12,7 +12,7 @@ from ..topology import Piece
 from ..topology.surface import Together
 from .conformal import conformal_map
 from .cotangent import corner_sides, cotangent, edge_weights, weight_roundings
-from .polish import errors_of_one_size, polish
+from .polish import CAREFUL, MOST_CAREFUL, PolishedMesh, count_flipped, errors_of_one_size, polish
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +78,34 @@ def refined(
     noise = None if noise is None or (noise == 1).all() else noise
     spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
-        found = polish(piece, weights, mesh.z, scale=scale, spread=spread)
+        found = _polished(piece, weights, mesh.z, scale, spread)
         misfit = weights / found.scale - edge_weights(piece, found.z)
         if rounding and spread is not None and errors_of_one_size(misfit, spread):
             spread = noise
-            found = polish(piece, weights, found.z, scale=scale, spread=spread)
+            found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
     if found.converged:
         return PieceMesh(found.z, found.scale, mesh.notes, spread)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
     return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
+
+
+def _polished(
+    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
+) -> PolishedMesh:
+    """By the chord iteration; where it comes to no end, by small steps from the better of start and result.
+
+    Rounding in the normal equations of long thin pieces is one reason for that.
+    """
+    found = polish(piece, weights, start, scale=scale, spread=spread)
+    finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
+    flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
+    if (found.converged and not flipped) or piece.n_vertices > MOST_CAREFUL:
+        return found
+    nearest = found.z if flipped <= count_flipped(piece, start) else start
+    again = polish(piece, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
+    return again if again.residual < found.residual or not finite else found
 
 
 def collapsed(piece: Piece, z: NDArray) -> str:

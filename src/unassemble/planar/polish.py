@@ -3,8 +3,9 @@
 Minimises sum_e ((c w_e(z) - a_e) / s_e)^2 over positions z and, where it is unknown, the scale c; a_e = -A_ij, and
 s_e is the standard deviation of its error up to a common factor.
 The conformal null vector starts inside the basin, so one factorisation of J'J at the start serves all steps (a chord
-iteration) as long as they contract. Starts that noise has bent too far for that lead to no end: cotangents have poles
-where triangles are flat, so that a step which turns one over may lower the misfit and still lead away.
+iteration) as long as they contract. Starts that noise has bent too far for that take a factorisation for each step, and
+no triangle is turned over on the way: cotangents have poles where triangles are flat, so that a step which turns one
+over may lower the misfit and still lead away.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
-from .cotangent import edge_weights
+from .cotangent import areas, edge_weights
 from .iterative import IterativeNormalEquations
 from .normal import GaussNewton, Jacobian, NormalEquations, WeightJacobian, distant_pair
 
@@ -39,10 +40,15 @@ class PolishOptions:
     # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
     direct_limit: int = 1_500_000  # above so many vertices conjugate gradients take a tenth of the memory
+    careful: bool = False  # a factorisation for each step, which is cut short before a triangle turns over
 
 
 SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 """Where only the right cells, or the right entries set aside, are worth more."""
+
+CAREFUL = PolishOptions(careful=True)
+MOST_CAREFUL = 200_000
+"""Vertices of a piece for which so many factorisations are worth their time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +167,7 @@ def polish(
     equations: NormalEquations | None = None
     system: GaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
+    history: list[tuple[float, float]] = []
     while steps < options.max_steps and not converged:
         jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
@@ -183,8 +190,12 @@ def polish(
                 break
             system, length = None, np.inf
             continue
-        change = float(np.linalg.norm(jacobian.forward(move)))
-        better = downhill(problem, fit, move)
+        change, share = float(np.linalg.norm(jacobian.forward(move))), 1.0
+        if options.careful and isinstance(drawn, Piece):
+            system, before = None, signed_areas(drawn, fit.z)
+            while share > 1e-4 and (signed_areas(drawn, fit.z + share * move) < 0.1 * before)[before > 0].any():
+                share /= 2  # a triangle would lose most of its area
+        better = downhill(problem, fit, share * move)
         steps += 1
         _log.debug("polish step %d: length %.1e, misfit %.3e", steps, length, fit.norm)
         # Expect the next step to shrink by the root of the last ratio: a chord iteration's first gain is its best. A
@@ -192,12 +203,26 @@ def polish(
         coming = length * (np.sqrt(min(length / previous, 1.0)) if np.isfinite(previous) else 1.0)
         converged = coming <= options.tolerance or ((slow or better is None) and length <= options.rounding)
         converged = converged or change <= options.settled * fit.noise
-        if better is None and not converged:
+        history.append((fit.norm, change))
+        # In six steps neither the misfit fell by a thousandth nor the steps became half as large.
+        stalled = steps > 6 and fit.norm > 0.999 * history[-7][0] and change > 0.5 * history[-7][1]
+        if (better is None or (stalled and options.careful)) and not converged:
             break
         fit = better or fit
     if equations is not None:
         equations.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, factorisations, converged, length)
+
+
+def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """Twice the area of each triangle (m,), positive for the orientation that prevails."""
+    signed = areas(piece, z)
+    return signed if signed.sum() >= 0 else -signed
+
+
+def count_flipped(piece: Piece, z: NDArray) -> int:
+    """Number of triangles that are flat, or turned over relative to the others."""
+    return int(np.count_nonzero(~(signed_areas(piece, z) > 0)))
 
 
 def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:

@@ -82,7 +82,7 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
             return error
 
     with clock(method):
-        doubtful = in_doubt(matrix, topology, start, scale)
+        doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
     if doubtful.any():
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
