@@ -21,7 +21,6 @@ from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import areas, edge_weights
-from .iterative import IterativeNormalEquations
 from .normal import GaussNewton, Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -39,7 +38,7 @@ class PolishOptions:
     # the iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
     # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
-    direct_limit: int = 1_500_000  # above so many vertices conjugate gradients take a tenth of the memory
+    most_vertices: int = 1_500_000  # the factor of larger meshes takes more memory than most machines have
     careful: bool = False  # a factorisation for each step, which is cut short before a triangle turns over
 
 
@@ -152,9 +151,11 @@ def polish(
     it is fitted; `spread` (e,): standard deviations of the errors of a up to a common factor, for instance
     :func:`~unassemble.planar.cotangent.weight_roundings`, of one size by default.
 
-    Raises SolverError if cells are flat at the start.
+    Raises SolverError if cells are flat at the start, or there are too many.
     """
     options = options or PolishOptions()
+    if len(z) > options.most_vertices:
+        raise SolverError(f"it has more than {options.most_vertices:,} vertices")
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
@@ -174,8 +175,6 @@ def polish(
         if system is None:
             if equations is not None:
                 equations.renew(jacobian)
-            elif isinstance(jacobian, WeightJacobian) and len(z) > options.direct_limit:
-                equations = IterativeNormalEquations(jacobian)
             else:
                 equations = NormalEquations(jacobian, pins)
             system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)

@@ -15,6 +15,7 @@ from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.hinges import groups
 from ..planar.piece import PieceMesh, collapsed, left_by_all, positions, refined
+from ..planar.polish import PolishOptions
 from ..tolerances import NOISY
 from ..topology import Piece, Topology
 from ..words import sentences
@@ -76,8 +77,9 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
 
     @cache
     def start(piece: Piece) -> Outcome:
+        sharp = not refine or piece.n_vertices > PolishOptions().most_vertices
         try:
-            return _start(piece, -matrix.entries[piece.edge_rows], method, scale, sharp=not refine)
+            return _start(piece, -matrix.entries[piece.edge_rows], method, scale, sharp=sharp)
         except (GeometryError, SolverError) as error:
             return error
 
