@@ -28,7 +28,6 @@ def answer(
     edges: NDArray[np.int64],
     sized: bool = True,
     free: str = "",
-    uniqueness: str = "searched",
     notes: list[str],
     **fields: Any,
 ) -> Structure:
@@ -51,7 +50,7 @@ def answer(
         node_status=(found.component < 0).astype(np.int8),
         evidence=found.evidence,
         status=status,
-        uniqueness=uniqueness if status == "certified" else None,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
         timings=request.clock.timings,

@@ -11,7 +11,7 @@ from ..linalg import blas_threads
 from ..nodes.anchoring import Request
 from ..nodes.rounded import Known, Rounding, known_to, with_exact_sums
 from ..recovery import Structure
-from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
 from .certificate import forces, members_misfits, mispaired
@@ -121,7 +121,7 @@ def _placed(
     spread = rounding.spread if rounding else 0.0
     nodes = nodes_of(matrix, numbering.layout, numbering.node_of_row, numbering.direction_of_row)
     with blas_threads(1):
-        members = straight_members(nodes, max(SUMMED, spread / 2), ends)  # the certificate has other formulas
+        members = straight_members(nodes, max(CERTIFIED, spread) / 2, ends)  # the certificate has other formulas
         return nodes, members, *turning_positions(nodes, members, max(CERTIFIED, spread))
 
 
