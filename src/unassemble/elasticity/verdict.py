@@ -53,12 +53,8 @@ def verdict(
     objection = objection or _to_identities(solution, error, numbering, nodal)
     holds = f"the valid identities hold to {error:.1e} (relative)"
     if rounding and known:
-        sure = f"{holds}, which is what entries rounded to {rounding.name} leave, so that positions are known to "
-        sure += f"{known.error:.0e} of the size"
-        if not (error <= max(rounding.spread, CERTIFIED) and known.explained):
-            objection = objection or Reason(f"{holds}, more than entries rounded to {rounding.name} leave")
-        elif known.error > rounding.needed:
-            objection = objection or Reason(sure)
+        sure = holds + known.within(rounding)
+        objection = objection or known.objection(error, rounding, holds)
     else:
         nearly = _softest(solution)
         sure = "the valid identities hold to rounding, and only translations and scale satisfy them"
@@ -114,10 +110,6 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
 
 def _to_identities(solution: Solution, error: float, numbering: Numbering, nodal: NodalMatrix) -> Reason | None:
     """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
-    if solution.straight:
-        return Reason(
-            "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
-        )
     if numbering.likely:
         return Reason.of(
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
