@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from assembled import box, heterogeneous, on_plane, recover_elasticity, stiffness
-from supported import Given, judged, with_zeros
+from supported import Given, assert_certified, judged, with_zeros
 
 from unassemble.errors import GeometryError
 
@@ -88,6 +88,14 @@ def test_a_homogeneous_body_whose_axes_planes_alone_tell_is_certified_by_element
     found = recover_elasticity(case.matrix)
     assert found.status == "uncertified"
     assert "no elements show that they do" in found.reason
+
+
+@pytest.mark.parametrize("zeros", ["stored", "dropped"])
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+def test_false_planes_of_a_body_held_all_around(order, zeros):
+    """Elements tell its axes; they do not show where the nodes along the false plane are."""
+    case = held(body("tri-p1", (7, 7), 0.2), (slide(X0), X1, Y0, Y1), (), order, zeros)
+    assert_certified(case, 1e-8, 0.6)
 
 
 @pytest.mark.parametrize("seed", [6, 19])

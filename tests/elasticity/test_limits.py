@@ -22,6 +22,7 @@ from assembled import (
     with_penalty,
 )
 from supported import given as held
+from supported import judged
 
 from unassemble.errors import FormatError, GeometryError, RecoveryError
 from unassemble.modes import rigid_body_modes, save_amgcl_coordinates, save_petsc_vec
@@ -135,8 +136,8 @@ def test_fields_that_hardly_any_node_shares():
     """A plate of twelve squares with supports on all sides: all but one or two nodes of a piece are loose."""
     body = permuted_nodes(stiffness("tri-p2", box("tri-p2", (4, 5)), lam=49.0), seed=0)
     case = held(body, "several", "boundary first by component", "stored")
-    with pytest.raises(RecoveryError, match="null space of dimension"):
-        recover_elasticity(case.matrix)
+    found = recover_elasticity(case.matrix)
+    assert judged(found, case).error < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(3))

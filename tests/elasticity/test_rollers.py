@@ -72,6 +72,13 @@ def test_quadratic_elements_lose_little_where_symmetry_planes_meet(kind):
     assert any("no equation that holds for every element" in one for one in found.warnings)
 
 
+@pytest.mark.parametrize("kind", ["tri-p1", "tri-p2", "quad-q1"])
+def test_homogeneous_body_held_all_around(kind):
+    """Clamped, on rollers, and by penalties, behind which the free boundary shows: it fixes what the inside leaves."""
+    case = given(body(kind, perturb=0.2, lam=1.5, mu=1.0), "several", "interleaved", "stored")
+    assert_certified(case, 1e-9, 0.33)
+
+
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1"])
 def test_penalties_do_not_hide_what_was_eliminated_behind_them(kind):
     """What rows with a penalty lack of regular meshes adds up to zero in the others of their nodes."""

@@ -122,6 +122,11 @@ def about_assumptions(solution: Solution, guessed: int) -> Iterator[str]:
     """What was assumed, beside the identities, to determine positions, and directions of rows that were guessed."""
     if solution.planes:
         yield "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
+    if solution.straight:
+        yield (
+            "the body is homogeneous and held all around, where the identities leave an affine map free that the "
+            "elements determined"
+        )
     if guessed:
         yield (
             f"which directions {count_of(guessed, 'row', 'rows')} of nodes without coordinates belong to is not "

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from ..nodes.nodal import NodalMatrix, determined, eliminated, surrounded, valid_pairs
 from .nullspace.placing import Solution, placed
+from .straight import straightened
 
 # Nodes of a body in space beyond which planes are asked at once where there are rollers: without them rows next to
 # rollers leave hundreds of fields free, all of which charts would look for.
@@ -38,6 +39,10 @@ def solve(nodal: NodalMatrix) -> Solution:
             failure = error
         if found is None or not (found.unique and np.isfinite(found.firm_points).all()):
             found = _with_planes(nodal, found, valid)
+    if not (found is not None and found.unique):
+        found = straightened(nodal, found, valid)
+        if found is not None and found.straight and found.planes:  # elements told axes only, and no planes
+            found = replace(found, hanging=determined(found.points))
     if found is None:
         raise failure or GeometryError("no positions fit the valid rows")
     return found

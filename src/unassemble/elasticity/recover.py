@@ -62,10 +62,9 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         spread = rounding.spread if rounding else 0.0
         near = not error >= max(ALIKE, spread)  # NaN where only elements can tell
-        bent = not near or any(solution.freedoms)  # boundary terms go with the points
-        ratio = None if bent else lame_ratio(nodal, solution.valid, solution.points)
+        ratio = _lame_ratio(nodal, solution) if near else None
     found = Cells()
-    if (cells or solution.hanging is not None) and near:
+    if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio, max(CERTIFIED, spread))
     bar = None
@@ -142,6 +141,18 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         lame=lame,
         evidence=solution.evidence,
     )
+
+
+def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
+    """The number lambda / mu as boundary terms have it, or elements that told the axes of all pieces; None if none is.
+
+    Boundary terms go with the points, of which nothing but translation and scale may be free.
+    """
+    if any(solution.freedoms) or 0 < len(solution.straight) < len(solution.evidence):
+        return None
+    if not solution.straight:
+        return lame_ratio(nodal, solution.valid, solution.points)
+    return solution.straight[0] if np.ptp([poisson_ratio(one) for one in solution.straight]) < ALIKE else None
 
 
 def _flat(points: NDArray[np.float64]) -> bool:

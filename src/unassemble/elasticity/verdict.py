@@ -110,6 +110,10 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
 
 def _to_identities(solution: Solution, error: float, numbering: Numbering, nodal: NodalMatrix) -> Reason | None:
     """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
+    if solution.straight:
+        return Reason(
+            "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
+        )
     if numbering.likely:
         return Reason.of(
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "

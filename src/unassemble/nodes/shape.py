@@ -95,7 +95,7 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
         return single[0][0][:, :d] / np.sqrt(d), "affine"
     raise GeometryError(
         f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
-        "eliminated, as where a homogeneous body is held all around, or reduced integration leaves hourglass modes"
+        "eliminated, or reduced integration leaves hourglass modes"
     )
 
 

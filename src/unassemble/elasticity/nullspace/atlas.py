@@ -42,10 +42,12 @@ def null_fields(
     nodal: NodalMatrix,
     valid: NDArray[np.bool_],
     body: NDArray[np.int64],
+    *,
     patch: int | None = None,
+    terms: NDArray[np.float64] | None = None,
 ) -> Fields:
     """Least singular fields of all valid identities of a body's nodes, (m,), by charts of no more rows than `patch`."""
-    of: Of = partial(identities, nodal, valid)
+    of: Of = partial(identities, nodal, valid, terms=terms)
     size, graph = patch or PATCH[nodal.dim], nodal.graph
     parts = _patches(graph, body, size) if len(body) > 1.5 * size else [body]
     made = [_chart(of, graph, rows, whole=len(parts) == 1) for rows in parts]

@@ -29,23 +29,23 @@ def boundary_terms(d: int) -> NDArray[np.float64]:
     return np.concatenate([p, q], axis=3)
 
 
-def seen_terms(valid: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(d, d, d, 2 d) boundary terms in the valid places (d, d, d) of one node.
+def seen_terms(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(d, d, d, k) boundary terms in the valid places (d, d, d) of one node.
 
     A node without a row of direction b may use its place (b, b, b) for an equation without boundary terms.
     """
     d = len(valid)
-    seen = boundary_terms(d) * valid[..., None]
+    seen = terms * valid[..., None]
     for b in range(d):
         if valid[b].sum() == 1 and valid[b, b, b]:
             seen[b, b, b] = 0
     return seen
 
 
-def boundary_basis(valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+def boundary_basis(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
     """Orthonormal basis of the boundary terms seen by the valid places (d, d, d) of one node: (d, d, d, k)."""
     d = len(valid)
-    u, s, _ = np.linalg.svd(seen_terms(valid).reshape(d**3, 2 * d), full_matrices=False)
+    u, s, _ = np.linalg.svd(seen_terms(valid, terms).reshape(d**3, terms.shape[3]), full_matrices=False)
     return u[:, s > 1e-10].reshape(d, d, d, -1)
 
 
@@ -141,14 +141,18 @@ class Identities:
         return sp.bsr_array((blocks, self.indices, self.indptr), shape=(2 * d * m, d * len(self.columns)))
 
 
-def identities(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64]) -> Identities:
+def identities(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], terms: NDArray[np.float64] | None = None
+) -> Identities:
     """Collect the valid identities of some rows (m,), without those that say nothing once p and q are eliminated.
 
-    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs`.
+    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs`. The
+    fewer boundary `terms` (d, d, d, t) are unknown, the more equations are left; any p and q, where they are not given.
     """
+    terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
     code = valid[rows].reshape(-1, nodal.dim**3) @ (1 << np.arange(nodal.dim**3))
-    alike = [(code == value, boundary_basis(valid[rows[np.argmax(code == value)]])) for value in np.unique(code)]
+    alike = [(code == value, boundary_basis(valid[rows[np.argmax(code == value)]], terms)) for value in np.unique(code)]
     equations = valid[rows].sum(axis=(1, 2, 3))
     for same, basis in alike:
         equations[same] -= basis.shape[3]
@@ -184,7 +188,7 @@ def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.
     both = np.full((len(local.rows), 2 * d), np.nan)  # p and q, in units of the size of the row
     for rows, basis in local.kinds:
         if basis.shape[3] == 2 * d:  # the valid pairs determine them
-            seen = seen_terms(local.valid[rows[0]]).reshape(d**3, 2 * d)
+            seen = seen_terms(local.valid[rows[0]], boundary_terms(d)).reshape(d**3, 2 * d)
             both[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
     unknown = nodal.graph @ (~known).astype(float) > 0
     p, q = np.split(both[np.isfinite(both).all(axis=1) & ~unknown[local.rows]], 2, axis=1)

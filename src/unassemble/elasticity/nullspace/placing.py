@@ -33,6 +33,7 @@ class Solution:
     exact: bool  # whether all pieces have exact null fields
     warnings: tuple[str, ...]
     planes: bool = False  # whether nodes that lack a direction were taken to lie in planes across it
+    straight: tuple[float, ...] = ()  # lambda / mu of the pieces whose axes the identities leave free and elements told
     # (n,) nodes that only equations determine that rest on an assumption, of planes
     hanging: NDArray[np.bool_] | None = None
 
