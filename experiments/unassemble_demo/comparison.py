@@ -18,7 +18,8 @@ def plot_comparison(true_points: NDArray[np.float64], mesh: PlanarMesh, path: Pa
     Row i of `true_points`, (n, 2), belongs to matrix row i.
     """
     truth = aligned(true_points, mesh.points, mesh.component)
-    figure = Figure(figsize=(13, 5.5))
+    wide, high = np.ptp(mesh.points[mesh.component >= 0], axis=0)
+    figure = Figure(figsize=(13, 1 + 6 * high / wide), layout="constrained")
     for ax, points, name in zip(figure.subplots(1, 2), (truth, mesh.points), ("true", "recovered"), strict=True):
         replace(mesh, points=points).plot(ax=ax)
         ax.set_title(name, style="italic")
