@@ -13,17 +13,19 @@ from unassemble.planar import fit_similarity
 
 
 def plot_comparison(true_points: NDArray[np.float64], mesh: PlanarMesh, path: Path) -> Figure:
-    """Draw the true mesh, each piece moved by the best similarity or reflection, beside the recovered one.
+    """Draw the true mesh, or its mirror image, beside the recovered one, each piece of which is moved onto it.
 
     Row i of `true_points`, (n, 2), belongs to matrix row i.
     """
-    truth = aligned(true_points, mesh.points, mesh.component)
-    wide, high = np.ptp(mesh.points[mesh.component >= 0], axis=0)
+    a, b, c = true_points[mesh.divided()[0]].swapaxes(0, 1) @ [1, 1j]
+    truth = true_points * [1, np.sign(np.sum(np.conj(b - a) * (c - a)).imag)]  # cells run counter-clockwise
+    found = aligned(mesh.points, truth, mesh.component)
+    wide, high = np.ptp(truth[mesh.component >= 0], axis=0)
     figure = Figure(figsize=(13, 1 + 6 * high / wide), layout="constrained")
-    for ax, points, name in zip(figure.subplots(1, 2), (truth, mesh.points), ("true", "recovered"), strict=True):
+    for ax, points, name in zip(figure.subplots(1, 2), (truth, found), ("true", "recovered"), strict=True):
         replace(mesh, points=points).plot(ax=ax)
         ax.set_title(name, style="italic")
-    error = largest_error(truth, mesh.points)
+    error = largest_error(found, truth)
     figure.suptitle(f"{mesh.status}, largest error {error:.1e} of the diameter", weight="bold")
     with whole_file(path, path.suffix) as draft:
         figure.savefig(draft, dpi=160)
@@ -44,6 +46,6 @@ def aligned(points: NDArray[np.float64], target: NDArray[np.float64], component:
 
 def largest_error(moved: NDArray[np.float64], target: NDArray[np.float64]) -> float:
     """Largest distance between points, relative to the diagonal of the box around the target."""
-    rows = np.isfinite(target).all(axis=1)
+    rows = np.isfinite(moved).all(axis=1)
     distance = np.linalg.norm(moved[rows] - target[rows], axis=1)
     return float(distance.max() / np.linalg.norm(np.ptp(target[rows], axis=0)))
