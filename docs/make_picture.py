@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from unassemble import recover
-from unassemble.demo import lake
+from unassemble_demo import lake
 
 INK, FILL, SHORE, ISLAND = "#16324f", "#7ba3cc", "#16324f", "#e2552f"
 

@@ -22,7 +22,7 @@ from .nodes.unknowns import (
     numbering_at_sight,
     regular_numbering,
 )
-from .structures import Beam, StructuralNumbering, find_structure, given_structure, truss_numbering
+from .structures import StructuralNumbering, find_structure, given_structure, truss_numbering
 from .structures.beams import MOST, find_beam
 from .structures.gaps import directions_with_gaps
 from .structures.layouts import SPACE
@@ -147,7 +147,7 @@ def about_translations(matrix: OperatorMatrix) -> str:
     )
 
 
-def _beam(matrix: OperatorMatrix) -> Beam | None:
+def _beam(matrix: OperatorMatrix) -> StructuralNumbering | None:
     """The matrix of a straight beam, whose graph may be planar; costs next to nothing where rows have more entries."""
     full = np.bincount(matrix.edges[matrix.entries != 0].ravel(), minlength=1)
     return find_beam(matrix.csr()) if full.max() <= MOST else None

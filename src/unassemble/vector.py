@@ -13,7 +13,7 @@ from .nodes import Numbering, Request
 from .nodes.nodal import nodal_matrix
 from .operators import VectorReading
 from .recovery import Recovery
-from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
+from .structures import StructuralNumbering, serve_structure
 from .structures.layouts import PINNED
 from .structures.trusses import bars_of, serve_truss
 from .tolerances import CANCELLED
@@ -30,8 +30,6 @@ def recover_vector(
     request = Request(matrix, clock, anchors, cells, reading.why, rounding)
     space = numbering.layout.space if isinstance(numbering, StructuralNumbering) else numbering.block_size
     request.held(numbering.node_of_row, space)  # anchors that do not fit, before the long work
-    if isinstance(numbering, Beam):
-        return serve_beam(numbering, request)
     if isinstance(numbering, StructuralNumbering):
         return serve_structure(numbering, request)
     with clock("numbering"):

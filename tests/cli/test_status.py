@@ -279,7 +279,7 @@ def test_demo_runs_where_it_is_told(work, monkeypatch):
         echo("some text")
         return [SimpleNamespace(certified=certified) for certified in seen["certified"]]
 
-    monkeypatch.setattr("unassemble.demo.run", run)
+    monkeypatch.setattr("unassemble_demo.run", run)
     for certified, status in [([True, True], 0), ([True, False], 3)]:
         seen["certified"] = certified
         result = work.run("demo", "-o", "there")

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from built import add_members, assembled, cells_of, error, flat, frame, model_on, plane_frame, plate, shell, truss
 
 from unassemble import InputError, RecoveryError, inspect_matrix, recover
-from unassemble.demo import mast
+from unassemble_demo import mast
 
 CASES = {
     "frame": (frame, "frame or shell", 2),

@@ -148,7 +148,7 @@ def demo(folder: str) -> int:
 
     Matrices, meshes, reports and pictures of true and recovered mesh go to a folder.
     """
-    from ..demo import run
+    from unassemble_demo import run
 
     recoveries = run(folder, echo=say)
     return Exit.CERTIFIED if all(recovery.certified for recovery in recoveries) else Exit.UNCERTIFIED

@@ -14,7 +14,7 @@ from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
 from ..recovery import Body
-from ..tolerances import ALIKE
+from ..tolerances import ALIKE, CERTIFIED
 from ..words import Reason
 from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
@@ -60,18 +60,19 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     with request.clock("certify"):
         misfits = residuals(nodal, solution.valid, solution.points)
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
-        near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
+        spread = rounding.spread if rounding else 0.0
+        near = not error >= max(ALIKE, spread)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = Cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
-            found = recognise_cells(nodal, solution.points, ratio)
+            found = recognise_cells(nodal, solution.points, ratio, max(CERTIFIED, spread))
     bar = None
     if rounding and near and not any(solution.freedoms):
         with request.clock("certify"):
             bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
     status, reason = verdict(nodal, solution, error, found, numbering, rounding, bar)
-    alone = status == "certified" and not found.certified and bar is None
+    alone = status == "certified" and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))

@@ -53,12 +53,8 @@ def verdict(
     objection = objection or _to_identities(solution, error, numbering, nodal)
     holds = f"the valid identities hold to {error:.1e} (relative)"
     if rounding and known:
-        sure = f"{holds}, which is what entries rounded to {rounding.name} leave, so that positions are known to "
-        sure += f"{known.error:.0e} of the size"
-        if not (error <= max(rounding.spread, CERTIFIED) and known.explained):
-            objection = objection or Reason(f"{holds}, more than entries rounded to {rounding.name} leave")
-        elif known.error > rounding.needed:
-            objection = objection or Reason(sure)
+        sure = holds + known.within(rounding)
+        objection = objection or known.objection(error, rounding, holds)
     else:
         nearly = _softest(solution)
         sure = "the valid identities hold to rounding, and only translations and scale satisfy them"

@@ -23,7 +23,8 @@ from scipy.special import fdtri
 from ..budget import REDRAWN
 from ..errors import GeometryError
 from ..matrix.digits import Digits
-from ..tolerances import ALIKE, CANCELLED, CONFIDENCE, HARDLY_ANY, LAST_DIGITS, NOISY, SIGMAS
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED, CONFIDENCE, HARDLY_ANY, LAST_DIGITS, NOISY, SIGMAS
+from ..words import Reason
 from .nodal import determined
 from .orders import ORDERS, regular
 from .searching import directions_in_order, live_part
@@ -133,6 +134,22 @@ class Known:
 
     error: float  # largest of a node, relative to the diameter of its piece; infinite where one may get lost
     explained: bool = True  # whether rounding explains the misfits, so that the error is all that there is
+
+    def objection(self, misfit: float, rounding: Rounding | None, said: str) -> Reason | None:
+        """Why positions are not certified that leave some largest misfit, which is `said`; None where they are."""
+        allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
+        if not (misfit <= allowed and self.explained):
+            return Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
+        return (
+            Reason(f"{said}, and positions may be off by {self.error:.0e} of the size") if self.error > needed else None
+        )
+
+    def within(self, rounding: Rounding | None) -> str:
+        """How far positions are known, in words; empty for entries of full precision."""
+        if rounding is None:
+            return ""
+        far = f"as far as entries rounded to {rounding.name} tell"
+        return f", {far}: positions are known to {self.error:.0e} of the size"
 
 
 def known_to(

@@ -1,48 +1,96 @@
-"""A structure as it is given back: moved to its anchors, with the fields and sentences that all kinds share."""
+"""A structure held against its matrix and given back: the verdict, fields and sentences that all kinds share."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..nodes.anchoring import Request, anchored
 from ..nodes.numbering import Numbering
+from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Structure
 from ..tolerances import ROUNDED
-from ..words import GIVE_NUMBERING, Reason
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .placed import Placed
 from .recognise import StructuralNumbering
 
 
-def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
-    """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
-    return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Positions held against the matrix."""
+
+    error: float  # the largest misfit
+    misfits: NDArray[np.float64]  # (k,), with their signs
+    again: Callable[[sp.csr_array], tuple[NDArray, NDArray]]  # points and misfits of a matrix rounded otherwise
+    rounding: Rounding | None
+    said: tuple[str, str]  # what holds, and what of it does not
+    rows: NDArray[np.bool_]  # (N,) rows that say so
+    unknowns: NDArray[np.bool_]  # (N,) that these touch
+
+    def known(self, found: Placed, *, sized: bool) -> Known:
+        """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
+        if self.rounding is None:
+            loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
+            return Known(float(self.error * np.sqrt(loosest.rows) / loosest.gap))
+        return known_to(found.points, found.component, self.misfits, self.rounding, self.again, sized=sized)
+
+    def verdict(self, found: Placed, known: Known) -> tuple[str, Reason]:
+        """Status and reason."""
+        holds, left = self.said
+        objection = known.objection(self.error, self.rounding, left)
+        if objection is None and found.unnoticed.any():
+            count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
+            unseen = (
+                f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
+            )
+            objection = Reason(unseen, WITHOUT_SUPPORTS)
+        if objection is not None:
+            return "uncertified", objection
+        digits = known.within(self.rounding)
+        share = f"{self.rows.mean():.0%} of the rows say so, of {self.unknowns.mean():.0%} of the unknowns"
+        return "certified", Reason(f"{holds}{digits}: {share}")
+
+
+def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
+    """What there is to say of nodes without coordinates, (n,)."""
+    count = f"{loose.sum()} of {count_of(len(loose), 'node')}"
+    return [f"{count} cannot be determined: {why}"] if loose.any() else []
 
 
 def answer(
     numbering: Numbering | StructuralNumbering,
     request: Request,
     found: Placed,
-    verdict: tuple[str, Reason],
+    held: Held,
     *,
     edges: NDArray[np.int64],
-    sized: bool = True,
-    free: str = "",
-    uniqueness: str = "searched",
+    sized: bool,
+    free: str,
+    doubt: Callable[[], Reason | None] = lambda: None,
     notes: list[str],
     **fields: Any,
 ) -> Structure:
-    """What was found, by status and reason of the `verdict`; what is `free` is said where anchors leave a size so.
+    """What was found, with its verdict; what is `free` is said where anchors leave a size so.
 
-    Errors are measured in distances of coupled nodes, `edges` (e, 2); `fields` are further ones of a Structure.
+    What is `held` against the matrix counts unless there is a `doubt`. Errors are measured in distances of coupled
+    nodes, `edges` (e, 2); `fields` are further ones of a Structure.
     """
-    held = request.held(numbering.node_of_row, found.points.shape[1])
+    with request.clock("certify"):
+        known = held.known(found, sized=sized)
+        verdict = held.verdict(found, known)
+        doubts = doubt() if verdict[0] == "certified" else None
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
-    if verdict[0] == "certified" and 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
-        verdict = "uncertified", Reason("most nodes that are coupled are in one place", GIVE_NUMBERING)
+    if 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
+        doubts = Reason("most nodes that are coupled are in one place", GIVE_NUMBERING)
+    if verdict[0] == "certified" and doubts is not None:
+        verdict = "uncertified", doubts
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
+    anchors = request.held(numbering.node_of_row, found.points.shape[1])
     points, factor, more, (status, reason) = anchored(
-        found.points, found.component, len(found.evidence), held, verdict, edge, sized=sized
+        found.points, found.component, len(found.evidence), anchors, verdict, edge, sized=sized
     )
     return Structure(
         points=points,
@@ -51,9 +99,11 @@ def answer(
         node_status=(found.component < 0).astype(np.int8),
         evidence=found.evidence,
         status=status,
-        uniqueness=uniqueness if status == "certified" else None,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
+        backward_error=held.error,
+        position_error=known.error if held.rounding and known.explained else None,
         timings=request.clock.timings,
         warnings=(*request.matrix.warnings, *found.notes, *notes, *([free] if np.isnan(factor).any() else []), *more),
         node_of_row=numbering.node_of_row,

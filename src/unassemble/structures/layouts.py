@@ -33,7 +33,7 @@ class Layout:
     @property
     def space(self) -> int:
         """Coordinates of a node: those that the matrix does not tell are zero."""
-        return self.dim if self.dim > 1 else 3
+        return self.dim if self.dim > 1 else max(self.displacements) + 1
 
     def turned(self, axis: int) -> list[tuple[int, int, int]]:
         """Unit rotation about an axis: (direction, coordinate, sign) of displacements, sign times the coordinate."""
@@ -61,6 +61,7 @@ PLANE = Layout("plane frame", 2, (0, 1), (2,))
 PLATE = Layout("plate", 2, (2,), (0, 1))
 BEAM = Layout("beam", 1, (1, 2), (1, 2))  # straight along x, bending in two planes that do not know of each other
 PINNED = Layout("structure", 3, (0, 1, 2), ())  # bars, membranes and solids, of any material, in one
+ALONG_X = Layout("plane frame", 1, (0, 1), (2,))  # straight, so that stretching has no part in rotations
 LAYOUTS = (SPACE, PLANE, PLATE, BEAM)
 SOLIDS = {d: Layout("solid", d, tuple(range(d)), ()) for d in (3, 2)}
 

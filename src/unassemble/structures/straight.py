@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..tolerances import LAST_DIGITS, SUMMED
+from ..tolerances import LAST_DIGITS
 from .layouts import Layout
 from .nodes import Nodes
 
@@ -31,10 +31,11 @@ class Straight:
     blocks: NDArray[np.float64]  # (m, b, b)
 
 
-def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int64] | None = None) -> Straight:
-    """Members between two nodes that have all their unknowns; up to an allowed misfit, or those of given ends."""
+def straight_members(nodes: Nodes, allowed: float, ends: NDArray[np.int64] | None = None) -> Straight:
+    """Members between nodes that have all unknowns that any has; up to an allowed misfit, or those of given ends."""
     b = nodes.layout.block_size
-    whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
+    present = nodes.present
+    whole: NDArray[np.bool_] = np.asarray((present | ~present.any(axis=0)).all(axis=1))
     if not nodes.layout.rotations:
         return Straight(np.empty((0, 2), np.int64), np.empty((0, nodes.layout.dim)), np.empty((0, b, b)))
     bsr = nodes.matrix.tobsr((b, b))

@@ -20,11 +20,9 @@ from ..nodes.constants import row_sizes
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
-from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Evidence, Structure
-from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
-from ..words import Reason, count_of
-from .answer import answer, covered
+from ..tolerances import CANCELLED, CERTIFIED, SMALL
+from .answer import Held, about_loose, answer
 from .least_squares import up_to_size
 from .placed import Piece, Placed, placed, without_free
 
@@ -99,45 +97,9 @@ def truss_numbering(
 def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
-    with request.clock("solve"):
-        found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
-    with request.clock("certify"):
-        misfits = _misfits(nodal, found.points)
-        error = float(np.abs(misfits).max(initial=0.0))
-        known = _known(misfits, found, numbering, rounding)
-    loose = found.component < 0
-    status, reason = _verdict(error, found, known, rounding)
-    if status == "certified":
-        rows = ~loose[numbering.node_of_row]
-        reason = Reason(f"{reason.text}: {covered(rows, rows)}")
-    notes = []
-    if loose.any():
-        notes.append(f"{loose.sum()} of {count_of(nodal.n, 'node')} cannot be determined: the directions of all bars "
-                     "leave them room")  # fmt: skip
-    lines = bars.ends[~loose[bars.ends].any(axis=1)]
-    return answer(
-        numbering,
-        request,
-        found,
-        (status, reason),
-        edges=lines,
-        sized=False,
-        free="the sign of the scale is free: the point reflection of a truss has the same matrix",
-        notes=notes,
-        lines=lines,
-        operator="truss",
-        backward_error=error,
-        position_error=known.error if rounding and known.explained else None,
-    )
+    allowed = rounding.spread if rounding else CERTIFIED
 
-
-def _known(misfits: NDArray, found: Placed, numbering: Numbering, rounding: Rounding | None) -> Known:
-    """How far positions may be off, relative to the size."""
-    if rounding is None:
-        return Known(max(one.residual / one.gap for one in found.evidence))
-    allowed = rounding.spread
-
-    def place(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         nodal = nodal_matrix(matrix, numbering)
         bars = bars_of(nodal, allowed)
         if bars is None:
@@ -145,22 +107,26 @@ def _known(misfits: NDArray, found: Placed, numbering: Numbering, rounding: Roun
         points = _place_joints(bars, numbering.n_nodes, allowed).points
         return points, _misfits(nodal, points)
 
-    return known_to(found.points, found.component, misfits, rounding, place, sized=False)
-
-
-def _verdict(error: float, found: Placed, known: Known, rounding: Rounding | None) -> tuple[str, Reason]:
-    if not (error <= (rounding.spread if rounding else CERTIFIED) and known.explained):
-        return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
-    if found.unnoticed.any():
-        return "uncertified", Reason("nothing in the matrix contradicts other directions of some bars")
-    if known.error > (rounding.needed if rounding else ALIKE):
-        return "uncertified", Reason(
-            f"the directions of the bars contradict each other by {found.residual:.1e}: positions are known to about "
-            f"{known.error:.0e} of the size"
-        )
-    digits = f", to {known.error:.0e} of the size as entries rounded to {rounding.name} leave it" if rounding else ""
-    return "certified", Reason(
-        f"bars along these directions re-assemble to the matrix, and these determine the nodes{digits}"
+    with request.clock("solve"):
+        found = _place_joints(bars, nodal.n, allowed)
+    misfits, loose = _misfits(nodal, found.points), found.component < 0
+    error, rows = float(np.abs(misfits).max(initial=0.0)), ~loose[numbering.node_of_row]
+    said = (
+        "bars between the nodes re-assemble to the matrix",
+        f"blocks are off those of bars by {error:.1e} of a row's largest",
+    )
+    lines = bars.ends[~loose[bars.ends].any(axis=1)]
+    return answer(
+        numbering,
+        request,
+        found,
+        Held(error, misfits, again, rounding, said, rows, rows),
+        edges=lines,
+        sized=False,
+        free="the sign of the scale is free: the point reflection of a truss has the same matrix",
+        notes=about_loose(loose, "the directions of all bars leave them room"),
+        lines=lines,
+        operator="truss",
     )
 
 

@@ -65,8 +65,12 @@ def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
     return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))
 
 
-def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
+def recognise_cells(
+    nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None, allowed: float = CERTIFIED
+) -> Cells:
     """Find cells that re-assemble to the matrix: of one kind, or triangles beside quadrilaterals.
+
+    Entries may be off by what is `allowed`, relative to the largest of their row.
 
     With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
     Where no material fits, boxes and quadratic cells that lie side by side and of which each entry belongs to one at
@@ -78,9 +82,9 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     which fewer rows can tell.
     """
     graph, known = coupled(nodal, points), determined(points)
-    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
+    ways = [Entries.of(nodal, known, likely, allowed) for likely in (surrounded(nodal, valid_pairs(nodal)), None)]
     found = Cells()
-    for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
+    for entries in ways if (ways[0].complete != ways[0].sure).any() else ways[:1]:
         other = _recognised(points, graph, entries, ratio)
         if other.certified:
             return other
@@ -101,7 +105,9 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
         seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
         if not all(len(one.cells) for one in seen):
             continue
-        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit))), None)
+        found = next(
+            (cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit, told.allowed))), None
+        )
         if found is not None:
             best, most = replace(found, shown=told.shown()), len(told.key)
         elif not best.recognised and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
@@ -117,12 +123,12 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
     return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
 
 
-def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float) -> Cells | None:
+def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float, allowed: float) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
-    if not (misfit <= CERTIFIED and lame.any() and np.isfinite(lame).all()):
+    if not (misfit <= allowed and lame.any() and np.isfinite(lame).all()):
         return None
     carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
     parts = np.split(carries, np.cumsum([len(one.cells) for one in blocks])[:-1])

@@ -28,9 +28,16 @@ class Entries:
     size: NDArray[np.float64]  # (e,) largest entry of the two nodes' rows, the smaller of the two
     complete: NDArray[np.bool_]  # (n,) nodes that lost no neighbour, and of which none is unknown
     sure: NDArray[np.bool_]  # (n,) those of which every row shows it
+    allowed: float  # what a value may be off by, relative to `size`
 
     @classmethod
-    def of(cls, nodal: NodalMatrix, known: NDArray[np.bool_], likely: NDArray[np.bool_] | None = None) -> Entries:
+    def of(
+        cls,
+        nodal: NodalMatrix,
+        known: NDArray[np.bool_],
+        likely: NDArray[np.bool_] | None = None,
+        allowed: float = CERTIFIED,
+    ) -> Entries:
         """Those of a matrix between nodes whose places are `known`, (n,); cells that have others are as good as lost.
 
         Nodes that are `likely`, (n,), count as complete though not every row shows it.
@@ -46,7 +53,8 @@ class Entries:
         present = nodal.row_of >= 0
         told = present[i][:, :, None] & present[j][:, None, :]
         size = np.minimum(largest[i], largest[j])
-        return cls(nodal.n, i * nodal.n + j, nodal.data[use], told, np.where(size > 0, size, 1.0), complete, sure)
+        size = np.where(size > 0, size, 1.0)
+        return cls(nodal.n, i * nodal.n + j, nodal.data[use], told, size, complete, sure, allowed)
 
     @property
     def largest(self) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
 from ...linalg import threads
-from ...tolerances import CERTIFIED, LITTLE, ROUNDED, SINGULAR
+from ...tolerances import LITTLE, ROUNDED, SINGULAR
 from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
@@ -62,10 +62,11 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
     rich = np.flatnonzero(own.sum(axis=1) >= np.median(own.sum(axis=1)))
     some = rich[:: max(len(rich) // _SAMPLE, 1)]
     few = entries.at(np.unique(pairs.place[some][own[some]]))
-    best, chosen = CERTIFIED, None
+    best, chosen = np.inf, None
     for rule in rules(block.kind) if len(few.key) else ():
         found, rest = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
-        if np.isfinite(found).all() and rest.largest < LITTLE * best:  # where geometry is affine they all fit
+        # Where geometry is affine they all fit.
+        if np.isfinite(found).all() and rest.largest <= min(entries.allowed, LITTLE * best):
             best, chosen = rest.largest, rule
     return chosen
 

@@ -1,23 +1,14 @@
-"""The main job on two matrices that this library did not assemble, and on a small structure."""
+"""Matrices that other packages assemble, and that of a lattice mast, with the meshes that they come from."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import made_folder, whole_file
-from .pipeline import recover
-from .plot import plot_comparison
-from .recovery import PlanarMesh, Recovery
-from .report import write_report
-from .summary import summary
+from unassemble.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,35 +20,6 @@ class Specimen:
     matrix: sp.coo_array
     points: NDArray[np.float64]  # (n, 2) or (n, 3), true positions of the matrix rows, or of the nodes of a structure
     anchors: tuple[tuple[float, ...], ...] = ()  # (row, x, y, z) of positions that are not kept aside
-
-
-def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lambda line: None) -> list[Recovery]:
-    """Write, read and recover the matrices; meshes, reports and pictures go to `folder`.
-
-    It is made where it does not exist. What there is to say goes to `echo`, line by line or in blocks.
-
-    Raises InputError if a package that meshes or assembles is not installed, or the folder cannot be written into.
-    """
-    folder = made_folder(folder)
-    recoveries = []
-    for specimen in (unit_square(), lake(), mast()):
-        file = folder / f"{specimen.name}.mtx"
-        with whole_file(file, ".mtx") as draft, draft.open("wb") as stream:  # given a name, scipy misses a full disk
-            scipy.io.mmwrite(stream, specimen.matrix, symmetry="symmetric", precision=17)
-        echo(f"{specimen.name}: {specimen.origin}\n")
-        recovery = recover(file, anchors=specimen.anchors)
-        recovery.save(folder / f"{specimen.name}.vtu")
-        write_report(recovery, folder / f"{specimen.name}.json")
-        picture = folder / f"{specimen.name}.png"
-        if isinstance(recovery, PlanarMesh):
-            plot_comparison(specimen.points, recovery, picture)
-        else:
-            recovery.plot(picture)
-        echo(summary(recovery))
-        drawn = "recovered structure" if recovery.vector_valued else "true and recovered mesh"
-        echo(f"\nin {folder}: {specimen.name}.mtx, .vtu, .json and .png ({drawn})\n")
-        recoveries.append(recovery)
-    return recoveries
 
 
 def unit_square() -> Specimen:
