@@ -42,7 +42,7 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
 def nearest_conformal(problem: WholeEntries, rim: Rim) -> NDArray[np.complex128]:
     """(n,) the conformal map of entries that are whole or guessed; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    c, _ = estimate_scale(problem.piece, given)
+    c = estimate_scale(problem.piece, given)
     return _conformal(problem, guessed(problem.piece, given, rim.given, c))
 
 

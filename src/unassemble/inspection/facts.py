@@ -106,7 +106,7 @@ def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
 def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
     """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
     try:
-        scale = estimate_scale(piece, weights)[0]
+        scale = estimate_scale(piece, weights)
     except GeometryError:
         scale = np.nan
     sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)

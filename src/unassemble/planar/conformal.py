@@ -20,14 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
+from ..tolerances import ALIKE, ROUNDED, SUMMED
 from ..topology import Piece
 from ..topology.keys import runs
 from .pencil import ConformalPencil, ShiftedSearch
 
 _log = logging.getLogger(__name__)
-
-_MANY = 100  # triangles that agree, if they are no small share: mirrored neighbours among others
 
 
 @dataclass(frozen=True)
@@ -53,8 +51,8 @@ class ConformalMap:
     converged: bool  # whether position changes fell to the level that the conditioning allows
 
 
-def estimate_scale(piece: Piece, weights: NDArray) -> tuple[float, float | None]:
-    """A guess of c, and what is probably right to all digits: what many triangles say, as on grids, or 1.
+def estimate_scale(piece: Piece, weights: NDArray) -> float:
+    """A guess of c.
 
     The halves g = cot / 2 of a triangle's three weights satisfy g1 g2 + g2 g3 + g3 g1 = 1/4. Sharing
     each weight equally between its two triangles gives one value of c from each triangle; the median is right to some
@@ -67,27 +65,8 @@ def estimate_scale(piece: Piece, weights: NDArray) -> tuple[float, float | None]
     a, b, c = (weights / largest / np.where(piece.inner, 2, 1))[piece.opposite].T
     form = a * b + b * c + c * a
     sizes = 2 * np.sqrt(form[form > 0])  # of triangles of which the three shares belong to a triangle at all
-    common = _common(sizes) if len(sizes) else None
-    size = float(np.median(sizes)) if len(sizes) else float(np.sqrt(3) * np.abs(weights / largest).mean())
-    unit = float(sign * size * largest)
-    if common is not None:
-        return unit, float(sign * common * largest)
-    return unit, 1.0 if abs(1 / unit - 1) < 0.3 else None
-
-
-def _common(values: NDArray[np.float64]) -> float | None:
-    """What most of some positive values are to nearly all digits, or very many, and no other value half as many.
-
-    On meshes of a few triangles over and over some values are frequent that are wrong.
-    """
-    values = np.sort(values)
-    alike = np.searchsorted(values, values * (1 + SUMMED), side="right") - np.arange(len(values))
-    first = int(np.argmax(alike))
-    count = int(alike[first])
-    alike[first : first + count] = 0
-    if count < min(MOST * len(values), max(LITTLE * len(values), _MANY)) or 2 * alike.max() > count:
-        return None
-    return float(np.median(values[first : first + count]))
+    size = np.median(sizes) if len(sizes) else np.sqrt(3) * np.abs(weights / largest).mean()
+    return float(sign * size * largest)
 
 
 def conformal_map(
@@ -101,17 +80,18 @@ def conformal_map(
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
-    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
-    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `unit`: a
-    guess of c, where weights are not those of the piece's triangles; c = 1 is then tried once that is near. `sharp`:
-    go on until z, not only c, has converged, which a polish does not need.
+    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise c = 1 is tried first if the
+    median of what triangles say allows it. `unit`: a guess of c, where weights are not those of the piece's triangles;
+    c = 1 is then tried once that is near. `sharp`: go on until z, not only c, has converged, which a polish does not
+    need.
 
     Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
     likely, whole = None, 1 / unit if unit else np.inf
     if unit is None:
-        unit, likely = estimate_scale(piece, weights)
+        unit = estimate_scale(piece, weights)
+        likely = 1.0 if abs(unit - 1) < 0.3 * unit else None
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import norm  # whose squares do not overflow
 
 from ..certify import Certificate
 from ..planar.terms import Term, lacking_term
@@ -35,7 +36,7 @@ def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search:
     Unless their noise is known, errors of the size that rounding has where there are slivers do not stand out.
     """
     freedom = solved.freedom(free_scale=free_scale)
-    noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
+    noise = None if freedom <= 0 else float(norm(certificate.differences, check_finite=False) / np.sqrt(freedom))
     suspects = _standing_out(solved) if search else NONE
     term = None
     linear = solved.topology.method != "cliques"
@@ -58,17 +59,11 @@ def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
 
 def pooled_noise(solved: Solved, freedom: int) -> float:
     """Common factor of the standard deviations of the entries' errors, in the norms that the pieces were fitted in."""
-    norms = []
+    left = []
     for weights, model, mesh in solved.fits:
         misfit = weights - mesh.scale * model.weights(mesh.z)
-        norms.append(_norm(misfit if mesh.spread is None else misfit / mesh.spread))
-    return _norm(np.array(norms)) / float(np.sqrt(max(freedom, 1)))
-
-
-def _norm(values: NDArray) -> float:
-    """Root of the sum of squares, none of which may overflow."""
-    largest = float(np.abs(values).max(initial=0.0))
-    return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
+        left.append(misfit if mesh.spread is None else misfit / mesh.spread)
+    return float(norm(np.concatenate(left), check_finite=False) / np.sqrt(max(freedom, 1)))
 
 
 def _standing_out(solved: Solved) -> NDArray[np.int64]:
@@ -84,7 +79,7 @@ def _standing_out(solved: Solved) -> NDArray[np.int64]:
             left = weights / mesh.scale - model.weights(mesh.z)
             rounding = model.roundings(mesh.z)
             squares = (left / (rounding if mesh.spread is None else mesh.spread)) ** 2
-            if spare < _SPARE or (solved.noise is None and _norm(left / rounding) <= SUMMED):
+            if spare < _SPARE or (solved.noise is None and norm(left / rounding, check_finite=False) <= SUMMED):
                 continue
         squares[gone[piece.edge_rows]] = 0.0
         most = squares.max()

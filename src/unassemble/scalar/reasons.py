@@ -14,7 +14,7 @@ from ..certify import Certificate
 from ..planar.terms import COEFFICIENT, MASS, Term
 from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of
-from .noise import NoiseTest
+from .noise import Noise
 from .solving import Solved, leaders
 
 if TYPE_CHECKING:
@@ -39,14 +39,14 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     if apart:
         yield f"the matrix is given back to {error:.1e} (relative), but {apart}", ""
-    if f.test:
-        allowed = max(PLACED, f.test.noise.sigma / float(np.abs(f.solved.scales).min()))
+    if noise := f.near.by_noise:
+        allowed = max(PLACED, noise.sigma / float(np.abs(f.solved.scales).min()))
         if f.evidence.term:
             yield from _lacking(f, f.evidence.term)
     if not doubt <= allowed:
         yield f"{f.fits}, but points are known to about {doubt:.0e} of the size only", ""
         yield from ((note, "") for note in f.trouble)
-    if len(topology.bare_edges) and not f.test:
+    if len(topology.bare_edges) and not noise:
         i, j = topology.edges[topology.bare_edges[0]]
         advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
         yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice
@@ -63,10 +63,13 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
 
 def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     """What does not fit, and what it looks like."""
-    topology, stored, certificate, test = f.solved.topology, f.solved.stored, f.certificate, f.test
-    if test and test.drowned:
-        much = f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
-        yield f"{much}{test.limit:.2g}, {LARGEST_NOISE:g} times the scale", "give less noise, if entries are that good"
+    topology, stored, certificate, noise = f.solved.topology, f.solved.stored, f.certificate, f.near.by_noise
+    if noise and f.near.drowned:
+        much = f"{noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
+        yield (
+            f"{much}{f.near.limit:.2g}, {LARGEST_NOISE:g} times the scale",
+            "give less noise, if entries are that good",
+        )
         return
     without = stored.incomplete_rows.any()
     model = _KEEP_ROWS if without else _ONE_COEFFICIENT if stored.adds_up.all() else _CHECK_MODEL
@@ -75,7 +78,7 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         yield f"{parts} no mesh: {topology.failures[0]}", _CHECK_MODEL
         return
-    if apart and not test:
+    if apart and not noise:
         yield apart, model
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
@@ -87,18 +90,18 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         some = count_of(len(flipped), "cell is", "cells are")
         rows = words_of(np.sort(next(islice(chain(*f.mesh.cells), int(flipped[0]), None))))
         yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
-    elif f.evidence.term and (test or not f.known_scale):
+    elif f.evidence.term and (noise or not f.known_scale):
         yield from _lacking(f, f.evidence.term)
     elif len(f.evidence.suspects):
         i, j = f.evidence.suspects[0]
         said = f"the entry of rows {i} and {j} stands out from the misfit of all others"
         yield said, "check the entries that stand out, which the report lists"
-    if test:
-        if test.likely and test.coincidence:
+    if noise:
+        if f.near.likely and f.near.coincidence:
             chance = "there are too few different entries beyond the unknowns to tell that from chance"
             yield f"{f.fits}, but {chance}", "write the entries with more digits"
-        if not test.likely:
-            yield _unlikely(f, test), "check the noise, and the entries"
+        if not f.near.likely:
+            yield _unlikely(f, noise), "check the noise, and the entries"
         yield _astray(f), ""
     elif remark := _like_noise(f):
         if without:
@@ -148,13 +151,14 @@ def _astray(f: Findings) -> str:
     return f"the polish has not come to a mesh that explains the matrix, and {why}"
 
 
-def _unlikely(f: Findings, test: NoiseTest) -> str:
+def _unlikely(f: Findings, noise: Noise) -> str:
     """That noise would not leave such a misfit."""
-    if test.figures["p_value"] < CONFIDENCE:
-        return f"the misfit is more than {test.noise} explains {test}"
-    i, j = f.certificate.pairs[test.worst]
+    figures = f.near.figures
+    if figures["p_value"] < CONFIDENCE:
+        return f"the misfit is more than {noise} explains {f.near}"
+    i, j = f.certificate.pairs[np.abs(f.certificate.differences / np.asarray(f.near.errors)).argmax()]
     return (
-        f"the entry of rows {i} and {j} is off by {test.figures['largest']:.1f} standard deviations of {test.noise}, "
+        f"the entry of rows {i} and {j} is off by {figures['largest']:.1f} standard deviations of {noise}, "
         f"more than the largest of {len(f.certificate.pairs)} would be"
     )
 

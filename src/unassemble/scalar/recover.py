@@ -17,7 +17,7 @@ from ..options import ScalarOptions
 from ..planar.deviations import covariances
 from ..planar.normal import distant_pair
 from ..recovery import PlanarMesh
-from ..tolerances import SIGMAS
+from ..tolerances import LARGEST_NOISE, SIGMAS
 from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
@@ -134,8 +134,8 @@ def small(stored: OperatorMatrix) -> bool:
 
 def _held(solved: Solved, mesh: Drawn, points: NDArray, *, free_scale: bool) -> Held:
     """The certificate of a mesh with these points, and the test against noise."""
-    freedom = solved.freedom(free_scale=free_scale)
-    return Held.of(mesh.held(points), solved.stored, solved.noise, freedom, solved.scales)
+    limit = LARGEST_NOISE * float(np.abs(solved.scales).min())
+    return Held(mesh.held(points), solved.stored, solved.noise, solved.freedom(free_scale=free_scale), limit)
 
 
 def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:

@@ -15,7 +15,6 @@ from ..recovery import PlanarMesh
 from ..words import Reason
 from .evidence import Evidence
 from .held import Held
-from .noise import NoiseTest
 from .reasons import ambiguous, far_away, objections
 from .solving import Solved
 
@@ -55,17 +54,12 @@ class Findings:
         return self.near.certificate
 
     @property
-    def test(self) -> NoiseTest | None:
-        """That against the errors of the entries, where these decide."""
-        return self.near.test if self.near.by_noise else None
-
-    @property
     def fits(self) -> str:
         """That, and how well, the mesh fits."""
-        if self.test is None:
-            error = self.certificate.backward_error
-            return f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-        return f"{self.test.noise} explains the misfit {self.test}"
+        if noise := self.near.by_noise:
+            return f"{noise} explains the misfit {self.near}"
+        error = self.certificate.backward_error
+        return f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
 
     @property
     def trouble(self) -> list[str]:
