@@ -122,14 +122,14 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
             mesh.points,
             list(mesh.blocks.values()),
             lambda points: mesh.held(stored, points),
-            lambda: least[spare + (task.scale is not None) <= 0],
+            lambda: least[spare + (not task.free_scale) <= 0],
             lambda _: ([], uniqueness),
             ConformingMesh,
             mesh.fields(),
         )
 
     models = [fit.entries for fit in fits]
-    return finished(Solved(stored, matrix, topology, fits, models, spare, task.noise), drawn, (), clock, task)
+    return finished(Solved(stored, matrix, topology, fits, models, spare, task, task.noise), drawn, (), clock)
 
 
 def _with_zeros(stored: OperatorMatrix, parts: Sequence[Part]) -> tuple[OperatorMatrix, Topology]:

@@ -30,40 +30,41 @@ _SPARE = 10  # entries beyond the unknowns, of fewer chance may give one much of
 _OF_ALL, _OF_MEAN = 0.15, 25.0  # squared misfit of an entry that stands out: of the sum, and in units of the mean
 
 
-def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search: bool) -> Evidence:
+def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> Evidence:
     """Evidence on a finished mesh; wrong entries are looked for if `search`.
 
     Unless their noise is known, errors of the size that rounding has where there are slivers do not stand out.
     """
-    freedom = solved.freedom(free_scale=free_scale)
-    noise = None if freedom <= 0 else float(norm(certificate.differences, check_finite=False) / np.sqrt(freedom))
+    noise = None
+    if (freedom := solved.freedom) > 0:
+        noise = float(norm(certificate.differences, check_finite=False) / np.sqrt(freedom))
     suspects = _standing_out(solved) if search else NONE
     term = None
     linear = solved.topology.method != "cliques"
     if noise and linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
-        term = _term(solved, noise, free_scale=free_scale)
+        term = _term(solved, noise)
     return Evidence(None if term else noise, suspects, term)
 
 
-def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
+def _term(solved: Solved, noise: float) -> Term | None:
     """What the model lacks, as the piece tells in which chance is least likely; no entry is blamed for that."""
     if not noise <= LARGEST_NOISE * np.abs(solved.scales).min() or (solved.noise and solved.noise.digits):
         return None
     found = []
     for piece, (weights, _, mesh) in zip(solved.topology.pieces, solved.fits, strict=True):
-        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=solved.task.free_scale)
         found += [] if term is None else [term]
     least = min(found, key=lambda term: term.probability, default=None)
     return least if least and least.probability * len(found) < CHANCE else None
 
 
-def pooled_noise(solved: Solved, freedom: int) -> float:
+def pooled_noise(solved: Solved) -> float:
     """Common factor of the standard deviations of the entries' errors, in the norms that the pieces were fitted in."""
     left = []
     for weights, model, mesh in solved.fits:
         misfit = weights - mesh.scale * model.weights(mesh.z)
         left.append(misfit if mesh.spread is None else misfit / mesh.spread)
-    return float(norm(np.concatenate(left), check_finite=False) / np.sqrt(max(freedom, 1)))
+    return float(norm(np.concatenate(left), check_finite=False) / np.sqrt(max(solved.freedom, 1)))
 
 
 def _standing_out(solved: Solved) -> NDArray[np.int64]:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Certificate, chi_square_verdict
-from ..matrix import OperatorMatrix
 from ..tolerances import CERTIFIED, CHANCE, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
 from .noise import Noise
+from .solving import Solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,23 +20,27 @@ class Held:
     """A certificate, and where noise is known the test of its misfit."""
 
     certificate: Certificate
-    stored: OperatorMatrix
-    noise: Noise | None
-    freedom: int  # entries less fitted unknowns
-    limit: float  # standard deviation of noise that drowns the cotangents
+    solved: Solved
+
+    @property
+    def limit(self) -> float:
+        """Standard deviation of noise that drowns the cotangents."""
+        return LARGEST_NOISE * float(np.abs(self.solved.scales).min())
 
     @cached_property
     def errors(self) -> NDArray[np.float64] | None:
         """(k,) standard deviations of the entries that the certificate compares."""
-        return self.noise.at(self.certificate.pairs, self.stored) if self.noise else None
+        return self.solved.noise.at(self.certificate.pairs, self.solved.stored) if self.solved.noise else None
 
     @cached_property
     def figures(self) -> dict[str, float]:
         """See :func:`unassemble.certify.chi_square_verdict`; empty without noise."""
-        if self.noise is None:
+        if self.solved.noise is None:
             return {}
         misfit = self.certificate.differences / np.asarray(self.errors)
-        return chi_square_verdict(misfit, self.freedom, self.noise.sigma, repeats=self.noise.repeats)
+        return chi_square_verdict(
+            misfit, self.solved.freedom, self.solved.noise.sigma, repeats=self.solved.noise.repeats
+        )
 
     def __str__(self) -> str:
         figures = [self.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value")]
@@ -57,14 +61,18 @@ class Held:
     @property
     def drowned(self) -> bool:
         """Whether almost any mesh would pass."""
-        return self.noise is not None and self.noise.sigma > self.limit
+        return self.solved.noise is not None and self.solved.noise.sigma > self.limit
 
     @property
     def coincidence(self) -> bool:
         """Whether entries without a mesh may be fitted to within their rounding by chance; noise given is believed."""
-        if self.noise is None or self.noise.digits is None:
+        if self.solved.noise is None or self.solved.noise.digits is None:
             return False
-        chance = self.freedom * self.noise.different * np.log(self.noise.sigma * LARGEST_NOISE / self.limit)
+        chance = (
+            self.solved.freedom
+            * self.solved.noise.different
+            * np.log(self.solved.noise.sigma * LARGEST_NOISE / self.limit)
+        )
         return bool(chance > np.log(CHANCE))
 
     @property
@@ -79,11 +87,11 @@ class Held:
         Entries of few digits that a mesh has exactly may be no rounded ones.
         """
         error = self.certificate.backward_error
-        if self.noise is None or self.freedom <= 0:  # no more entries than unknowns
+        if self.solved.noise is None or self.solved.freedom <= 0:  # no more entries than unknowns
             return None
         short = error <= SUSPICIOUS or not self.passed
-        harmless = error <= CERTIFIED and (self.drowned or (self.noise.digits is not None and short))
-        return None if harmless else self.noise
+        harmless = error <= CERTIFIED and (self.drowned or (self.solved.noise.digits is not None and short))
+        return None if harmless else self.solved.noise
 
     @property
     def passed(self) -> bool:

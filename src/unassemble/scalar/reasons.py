@@ -57,7 +57,7 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         )
         yield (
             f"{one} no entry to spare: {proves} proves nothing",
-            "" if f.known_scale else "give `scale` if it is known",
+            "give `scale` if it is known" if f.solved.task.free_scale else "",
         )
 
 
@@ -73,7 +73,7 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         return
     without = stored.incomplete_rows.any()
     model = _KEEP_ROWS if without else _ONE_COEFFICIENT if stored.adds_up.all() else _CHECK_MODEL
-    model = _LEAVE_SCALE if f.known_scale else model
+    model = model if f.solved.task.free_scale else _LEAVE_SCALE
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         yield f"{parts} no mesh: {topology.failures[0]}", _CHECK_MODEL
@@ -90,7 +90,7 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         some = count_of(len(flipped), "cell is", "cells are")
         rows = words_of(np.sort(next(islice(chain(*f.mesh.cells), int(flipped[0]), None))))
         yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
-    elif f.evidence.term and (noise or not f.known_scale):
+    elif f.evidence.term and (noise or f.solved.task.free_scale):
         yield from _lacking(f, f.evidence.term)
     elif len(f.evidence.suspects):
         i, j = f.evidence.suspects[0]
@@ -145,7 +145,7 @@ def _astray(f: Findings) -> str:
     """On a mesh that is not the one of known noise: where the polish has ended."""
     if len(f.evidence.suspects):
         return ""
-    if not f.polished:
+    if not f.solved.task.options.polished:
         return "the mesh was not polished"
     why = "whether that is because of the start, wrong entries or wrong cells cannot be told"
     return f"the polish has not come to a mesh that explains the matrix, and {why}"

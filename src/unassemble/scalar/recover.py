@@ -17,7 +17,7 @@ from ..options import ScalarOptions
 from ..planar.deviations import covariances
 from ..planar.normal import distant_pair
 from ..recovery import PlanarMesh
-from ..tolerances import LARGEST_NOISE, SIGMAS
+from ..tolerances import SIGMAS
 from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
@@ -59,13 +59,13 @@ def recover_scalar(
             mesh.points,
             [triangles],
             lambda points: certify(stored.edges, stored.entries, points, triangles, factors, placement.coefficients),
-            lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=task.scale is not None),
-            partial(_other_meshes, mesh, clock, task),
+            lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=not task.free_scale),
+            partial(_other_meshes, mesh, clock),
             PlanarMesh,
             mesh.fields(triangulate=options.triangulate) | {"n_holes": topology.n_holes},
         )
 
-    return finished(solved, drawn, (*vanished_notes(topology), *topology.failures), clock, task, sizes)
+    return finished(solved, drawn, (*vanished_notes(topology), *topology.failures), clock, sizes)
 
 
 def finished(
@@ -73,7 +73,6 @@ def finished(
     drawn: Callable[[list[NDArray]], Drawn],
     notes: Sequence[str],
     clock: Clock,
-    task: Task,
     sizes: NDArray[np.float64] | None = None,
 ) -> PlanarMesh:
     """From positions of pieces of any element to the answer: place, certificate, evidence, error bars and verdict.
@@ -81,7 +80,7 @@ def finished(
     `drawn`: pieces at positions, (k,) each, as a mesh; `notes`: what is to be said of it; `sizes` (pieces,): of pieces
     whose size nothing else tells.
     """
-    topology, placement, options, free_scale = solved.topology, task.placement, task.options, task.scale is None
+    topology, placement, options = solved.topology, solved.task.placement, solved.task.options
     with clock("place"):
         nodes, remarks = [mesh.nodes for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
         placed, origins, said = placement.placed(topology, nodes, remarks, sizes)
@@ -89,17 +88,15 @@ def finished(
         shift = origins[topology.component]
         written = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        near = far = _held(solved, mesh, mesh.points, free_scale=free_scale)
+        near = far = Held(mesh.held(mesh.points), solved)
         if origins.any():
-            far = _held(solved, mesh, written, free_scale=free_scale)
-        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
+            far = Held(mesh.held(written), solved)
+        evidence = weigh(solved, near.certificate, search=not near.passes)
     deviations = None
     if options.standard_deviations:
         with clock("deviations"):
-            deviations = _deviations(solved, task, placed)
-    status, uniqueness, reason, others = verdict(
-        Findings(solved, mesh, origins, near, far, evidence, not free_scale, options.polished)
-    )
+            deviations = _deviations(solved, placed)
+    status, uniqueness, reason, others = verdict(Findings(solved, mesh, origins, near, far, evidence))
     notes = [*solved.stored.warnings, *said, *notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
@@ -132,16 +129,10 @@ def small(stored: OperatorMatrix) -> bool:
     return bool(np.bincount(connected(stored.n, *stored.edges.T)[1]).max() <= SEARCHED_ROWS)
 
 
-def _held(solved: Solved, mesh: Drawn, points: NDArray, *, free_scale: bool) -> Held:
-    """The certificate of a mesh with these points, and the test against noise."""
-    limit = LARGEST_NOISE * float(np.abs(solved.scales).min())
-    return Held(mesh.held(points), solved.stored, solved.noise, solved.freedom(free_scale=free_scale), limit)
-
-
-def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
+def _deviations(solved: Solved, placed: list[NDArray]) -> NDArray:
     """(n, 2) standard deviations in the final frame, in which pieces are `placed`, (k,) each."""
-    pieces, tensor, free = solved.topology.pieces, task.placement.tensor, task.scale is None
-    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
+    pieces, tensor = solved.topology.pieces, solved.task.placement.tensor
+    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved)
     result = np.full((solved.topology.n_vertices, 2), np.nan)
     for p in range(len(pieces))[::-1]:  # the first piece at a hinge comes last
         model, mesh = solved.models[p], solved.meshes[p]
@@ -154,7 +145,7 @@ def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
             weights / spread,
             nodes,
             distant_pair(z),
-            free_scale=free,
+            free_scale=solved.task.free_scale,
             stretch=tensor.root if tensor else None,
             nodes=model.nodes,
         )
@@ -163,13 +154,14 @@ def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     return result
 
 
-def _other_meshes(mesh: JoinedMesh, clock: Clock, task: Task, findings: Findings) -> tuple[list[Alternative], str]:
+def _other_meshes(mesh: JoinedMesh, clock: Clock, findings: Findings) -> tuple[list[Alternative], str]:
     """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
 
     Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
     zeros show it no better than those that are not.
     """
-    solved, stored, noise = findings.solved, findings.solved.stored, findings.solved.noise
+    solved, task = findings.solved, findings.solved.task
+    stored, noise = solved.stored, solved.noise
     shown = solved.topology.method == "3-cycles"
     zero = stored.entries == 0
     if shown and not zero.any():

@@ -44,9 +44,6 @@ class Findings:
     near: Held
     written: Held
     evidence: Evidence
-    # whether c is known, and whether a polish was asked for
-    known_scale: bool
-    polished: bool
 
     @property
     def certificate(self) -> Certificate:
