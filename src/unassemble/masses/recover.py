@@ -25,6 +25,7 @@ from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
+from ..reductions import ConstantTensor
 from ..tolerances import ALIKE, CERTIFIED, SUMMED
 from ..topology import Topology
 from ..topology.surface import Together
@@ -35,12 +36,12 @@ from .settled import less_mass, settled
 
 
 def recover_with_terms(
-    matrix: OperatorMatrix, plain: Plain, clock: Clock, tensor: tuple[float, float, float] | None = None
+    matrix: OperatorMatrix, plain: Plain, clock: Clock, tensor: ConstantTensor | None = None
 ) -> PlanarMesh:
     """The mesh of a scalar matrix of linear triangles.
 
     `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
-    `tensor`: (kxx, kxy, kyy) to be undone.
+    `tensor`: to be undone.
     """
     held, found = Held(matrix, tensor), None
     if not held.has_sums.any():

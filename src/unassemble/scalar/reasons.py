@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..cells import Alternative
 from ..certify import Certificate
+from ..certify_spare import without_spare_equations
 from ..planar.terms import COEFFICIENT, MASS, Term
 from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of
@@ -50,7 +51,7 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         i, j = topology.edges[topology.bare_edges[0]]
         advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
         yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice
-    if len(rows := f.mesh.loose()):
+    if len(rows := _without_spare(f)):
         one = f"the piece of row {rows[0]} has" if len(rows) == 1 else f"{len(rows)} pieces, as of row {rows[0]}, have"
         proves = (
             f"nearly any entries belong to such a mesh, and that it gives the matrix back to {error:.1e} (relative)"
@@ -59,6 +60,18 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
             f"{one} no entry to spare: {proves} proves nothing",
             "give `scale` if it is known" if f.solved.task.free_scale else "",
         )
+
+
+def _linear(f: Findings) -> bool:
+    return f.solved.topology.method != "cliques"
+
+
+def _without_spare(f: Findings) -> NDArray[np.int64]:
+    """A row of each piece that has no equations to spare."""
+    solved, known = f.solved, not f.solved.task.free_scale
+    if _linear(f):
+        return without_spare_equations(solved.stored.edges, f.mesh.points, f.mesh.divided()[0], known_scale=known)
+    return np.array([piece.vertices.min() for piece in solved.topology.pieces])[solved.spare + known <= 0]
 
 
 def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
@@ -88,7 +101,8 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         return
     if len(flipped := certificate.flipped):
         some = count_of(len(flipped), "cell is", "cells are")
-        rows = words_of(np.sort(next(islice(chain(*f.mesh.cells), int(flipped[0]), None))))
+        cells = [f.mesh.divided()[0]] if _linear(f) else f.mesh.cells.values()
+        rows = words_of(np.sort(next(islice(chain(*cells), int(flipped[0]), None))))
         yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
     elif f.evidence.term and (noise or f.solved.task.free_scale):
         yield from _lacking(f, f.evidence.term)

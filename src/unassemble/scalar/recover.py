@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative, alternatives
-from ..certify import certify
-from ..certify_spare import without_spare_equations
 from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
@@ -21,13 +19,13 @@ from ..tolerances import SIGMAS
 from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
-from .held import Held
+from .held import Held, held
 from .joined import JoinedMesh
 from .noise import Noise
 from .notes import vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
-from .verdict import Drawn, Findings, verdict
+from .verdict import Findings, verdict
 
 
 def recover_scalar(
@@ -52,33 +50,31 @@ def recover_scalar(
         lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
         sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
 
-    def drawn(placed: list[NDArray]) -> Drawn:
+    def drawn(placed: list[NDArray]) -> PlanarMesh:
         mesh = JoinedMesh.of(topology, placed, solved.scales / placement.stretch)
-        triangles, factors = mesh.triangles, mesh.scale[mesh.triangle_piece]
-        return Drawn(
-            mesh.points,
-            [triangles],
-            lambda points: certify(stored.edges, stored.entries, points, triangles, factors, placement.coefficients),
-            lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=not task.free_scale),
-            partial(_other_meshes, mesh, clock),
-            PlanarMesh,
-            mesh.fields(triangulate=options.triangulate) | {"n_holes": topology.n_holes},
-        )
+        return PlanarMesh(**mesh.fields(), points=mesh.points, n_holes=topology.n_holes, operator=placement.operator)
 
-    return finished(solved, drawn, (*vanished_notes(topology), *topology.failures), clock, sizes)
+    said = (*vanished_notes(topology), *topology.failures)
+    found = finished(solved, drawn, partial(_other_meshes, clock), said, clock, sizes)
+    if options.triangulate:
+        none = Polygons.none()
+        cells = found.divided()[0]
+        found = replace(found, triangles=cells, polygons_offsets=none.offsets, polygons_data=none.vertices)
+    return found
 
 
 def finished(
     solved: Solved,
-    drawn: Callable[[list[NDArray]], Drawn],
+    drawn: Callable[[list[NDArray]], PlanarMesh],
+    other_meshes: Callable[[Findings], tuple[list[Alternative], str]],
     notes: Sequence[str],
     clock: Clock,
     sizes: NDArray[np.float64] | None = None,
 ) -> PlanarMesh:
     """From positions of pieces of any element to the answer: place, certificate, evidence, error bars and verdict.
 
-    `drawn`: pieces at positions, (k,) each, as a mesh; `notes`: what is to be said of it; `sizes` (pieces,): of pieces
-    whose size nothing else tells.
+    `drawn`: pieces at positions, (k,) each, as a mesh; `other_meshes`: those that fit as well, and the uniqueness;
+    `notes`: what is to be said; `sizes` (pieces,): of pieces whose size nothing else tells.
     """
     topology, placement, options = solved.topology, solved.task.placement, solved.task.options
     with clock("place"):
@@ -88,23 +84,23 @@ def finished(
         shift = origins[topology.component]
         written = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        near = far = Held(mesh.held(mesh.points), solved)
+        near = far = Held(held(solved.stored, mesh, placement.tensor), solved)
         if origins.any():
-            far = Held(mesh.held(written), solved)
+            far = Held(held(solved.stored, replace(mesh, points=written), placement.tensor), solved)
         evidence = weigh(solved, near.certificate, search=not near.passes)
     deviations = None
     if options.standard_deviations:
         with clock("deviations"):
             deviations = _deviations(solved, placed)
-    status, uniqueness, reason, others = verdict(Findings(solved, mesh, origins, near, far, evidence))
+    status, uniqueness, reason, others = verdict(Findings(solved, mesh, origins, near, far, evidence), other_meshes)
     notes = [*solved.stored.warnings, *said, *notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if uniqueness == "searched" and not small(solved.stored):
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     refused = status == "uncertified" and uniqueness is None
-    return mesh.kind(
-        **mesh.fields,
+    return replace(
+        mesh,
         **far.fields(10 if refused else 0, evidence.suspects),
         points=written,
         hinges=topology.hinges,
@@ -113,7 +109,6 @@ def finished(
         uniqueness=uniqueness,
         reason=reason.text,
         advice=reason.advice,
-        operator=placement.operator,
         timings=clock.timings,
         warnings=tuple(notes),
         standard_deviations=deviations,
@@ -154,13 +149,13 @@ def _deviations(solved: Solved, placed: list[NDArray]) -> NDArray:
     return result
 
 
-def _other_meshes(mesh: JoinedMesh, clock: Clock, findings: Findings) -> tuple[list[Alternative], str]:
+def _other_meshes(clock: Clock, findings: Findings) -> tuple[list[Alternative], str]:
     """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
 
     Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
     zeros show it no better than those that are not.
     """
-    solved, task = findings.solved, findings.solved.task
+    solved, mesh, task = findings.solved, findings.mesh, findings.solved.task
     stored, noise = solved.stored, solved.noise
     shown = solved.topology.method == "3-cycles"
     zero = stored.entries == 0
@@ -172,7 +167,8 @@ def _other_meshes(mesh: JoinedMesh, clock: Clock, findings: Findings) -> tuple[l
     z = np.asarray(mesh.points @ [1, 1j], dtype=np.complex128)
     if task.placement.tensor:
         z = np.asarray(task.placement.tensor.to_laplacian(z), dtype=np.complex128)
-    cells = Polygons.joined([Polygons.of_triangles(mesh.triangles[~mesh.in_polygon]), mesh.polygons])
+    polygons = Polygons(mesh.polygons_offsets, mesh.polygons_data)
+    cells = Polygons.joined([Polygons.of_triangles(mesh.triangles), polygons])
     agree = SIGMAS * sigma / float(np.abs(solved.scales).min())
     with clock("ambiguity"), blas_threads(1):  # many small problems
         others = alternatives(given.without(zero), cells, z, task.scale, agree)
