@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..certify import Certificate
-from ..certify_elements import certify_elements
+from ..certify import Certificate, certify
 from ..clock import Clock
 from ..elements.surface import fields_of
 from ..errors import GeometryError, SolverError, TopologyError
@@ -171,13 +170,10 @@ class JoinedParts:
 
     def held(self, matrix: OperatorMatrix, points: NDArray) -> Certificate:
         """The mesh with these points against the matrix."""
-        if tensor := self._placement.tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
-            z = tensor.to_laplacian(points @ [1, 1j])
-            points = np.column_stack([z.real, z.imag])
-        scale = np.array([fit.scale for fit in self._fits])
-        factors = {name: scale[piece] for name, piece in self._piece.items()}
+        scale = np.array([fit.scale for fit in self._fits]) / self._placement.stretch
+        factors, given = {name: scale[piece] for name, piece in self._piece.items()}, (matrix.edges, matrix.entries)
         rules = {name: rule for fit in self._fits for name, rule in fit.rule.items()}
-        return certify_elements(matrix.edges, matrix.entries, points, self.blocks, factors, rules)
+        return certify(*given, points, self.blocks, factors, rules=rules, tensor=self._placement.coefficients)
 
     def fields(self) -> dict[str, Any]:
         """What results say of the mesh, under the names that they have for it."""

@@ -52,13 +52,15 @@ def recover_scalar(
         lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
         sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
 
+    given, tensor = (stored.edges, stored.entries), placement.coefficients
+
     def drawn(placed: list[NDArray]) -> Drawn:
         mesh = JoinedMesh.of(topology, placed, solved.scales / placement.stretch)
         triangles, factors = mesh.triangles, mesh.scale[mesh.triangle_piece]
         return Drawn(
             mesh.points,
             [triangles],
-            lambda points: certify(stored.edges, stored.entries, points, triangles, factors, placement.coefficients),
+            lambda points: certify(*given, points, {"triangle": triangles}, {"triangle": factors}, tensor=tensor),
             lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=task.scale is not None),
             partial(_other_meshes, mesh, clock, task),
             PlanarMesh,
