@@ -12,14 +12,11 @@ from matplotlib.image import imread
 
 from handmade import lake, recovery_of, two_pieces, with_loose_row
 from meshes import random_mesh
-from unassemble.errors import InputError, OutputError
+from unassemble.errors import OutputError
 from unassemble.plot import (
-    align,
     check_plot,
     laid_out,
-    largest_error,
     outer_loops,
-    plot_comparison,
     plot_recovery,
     style,
 )
@@ -220,31 +217,3 @@ def test_large_meshes_become_an_image(tmp_path):
     assert (tmp_path / "large.svg").read_text().count("<image") == 1
     assert colours(ax) == {style.EDGE, style.OUTER, style.HOLE}
     assert (tmp_path / "large.svg").stat().st_size < 5e6
-
-
-@pytest.mark.parametrize("mirror", [1, -1])
-def test_comparison_finds_the_similarity(mirror, tmp_path):
-    recovery = lake()
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    truth = 3 * recovery.points * [1, mirror] @ turn + [10, -4]
-    aligned = align(recovery.points, truth, recovery.component)
-    np.testing.assert_allclose(aligned, truth, atol=1e-13)
-    truth[7, 0] += 0.01
-    figure = plot_comparison(truth, recovery, tmp_path / "both.png")
-    error = largest_error(align(recovery.points, truth, recovery.component), truth)
-    assert f"largest error {error:.1e} of the diameter" in words(figure)
-    assert [ax.get_title() for ax in figure.axes] == ["true", "recovered"]
-    assert all(colours(ax) == {style.EDGE, style.OUTER, style.HOLE} for ax in figure.axes)
-    assert 0.9 * 0.01 < error * np.linalg.norm(np.ptp(truth, axis=0)) < 1.1 * 0.01
-
-
-def test_comparison_moves_each_piece_by_itself():
-    recovery = two_pieces()
-    truth = recovery.points.copy()
-    truth[recovery.component == 1] = truth[recovery.component == 1] @ [[0, 2], [-2, 0]] + 5
-    assert largest_error(align(recovery.points, truth, recovery.component), truth) < 1e-14
-
-
-def test_comparison_needs_one_point_for_each_row():
-    with pytest.raises(InputError, match="shape"):
-        plot_comparison(np.zeros((3, 2)), lake())

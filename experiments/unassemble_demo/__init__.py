@@ -7,10 +7,10 @@ import scipy.io
 
 from unassemble import PlanarMesh, Recovery, recover
 from unassemble.files import made_folder, whole_file
-from unassemble.plot import plot_comparison
 from unassemble.report import write_report
 from unassemble.summary import summary
 
+from .comparison import plot_comparison
 from .specimens import lake, mast, unit_square
 
 __all__ = ["lake", "mast", "run", "unit_square"]

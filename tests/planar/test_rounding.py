@@ -112,7 +112,7 @@ def test_other_errors_are_estimated_though_entries_are_rounded():
     noisy = rounded(sp.coo_array((np.r_[value, value], ends), shape=known.matrix.shape), "%.6g")
     found, told = recover(noisy), recover(noisy, noise=sigma)
     assert found.status == "uncertified"
-    assert "looks like noise of standard deviation" in found.reason
+    assert "noise of standard deviation" in found.reason
     assert found.estimated_noise == pytest.approx(sigma, rel=0.15)
     assert told.certified, told.reason
     assert largest_error(found.points, told.points) < 0.1 * largest_error(told.points, known.points)

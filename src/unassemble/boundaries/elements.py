@@ -87,10 +87,13 @@ def _report(
     told = [(fit.fit.part.piece.vertices, fit.known_nodes) for fit in fits]
     placement, said = placement.upon(matrix.n, told)
     with clock("place"):
-        mesh = JoinedParts(topology, own, placement)
+        placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
+        mesh = JoinedParts(topology, own, placed, placement)
+        shift = origins[mesh.component]
+        written = mesh.points + np.column_stack([shift.real, shift.imag])
     status = node_status(mesh.component, told)
     with clock("certify"):
-        found = mesh.held(matrix, np.nan_to_num(mesh.written))
+        found = mesh.held(matrix, np.nan_to_num(written))
         pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
@@ -103,9 +106,11 @@ def _report(
     return ConformingMesh(
         **mesh.fields(),
         **fields,
+        points=written,
+        hinges=topology.hinges,
         operator=placement.operator,
         timings=clock.timings,
-        warnings=(*matrix.warnings, *said, *mesh.notes, *loose),
+        warnings=(*matrix.warnings, *said, *notes, *loose),
     )
 
 
@@ -157,7 +162,7 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
         trials = [_faded(replace(begun, entries=one.entries, rule=one.rule), whole, _THEN[:1], scale) for one in rules]
         for near_end in sorted(trials, key=lambda one: _size(one, whole))[:2]:
             fit = _faded(near_end, whole, _THEN, scale)
-            if not _size(fit, whole) <= EXACT or fit.entries.flipped(fit.z):
+            if not _size(fit, whole) <= EXACT or not (fit.entries.areas(fit.z) > 0).all():
                 continue
             w = fit.entries.weights(fit.z)
             jacobian = fit.entries.jacobian(fit.z, np.ones(len(w))).matrix
@@ -205,7 +210,7 @@ def _faded(start: Fitted, whole: NDArray[np.bool_], fading: Sequence[float], sca
         except SolverError:
             break
         own = found.scale * fit.entries.weights(found.z)
-        new = replace(fit, z=found.z, scale=found.scale, misfit=fit.weights - own)
+        new = replace(fit, z=found.z, scale=found.scale)
         if not np.isfinite(_size(new, whole)) or (weight == _THEN[-1] and _size(new, whole) > _size(fit, whole) / 2):
             break
         fit = replace(new, weights=np.where(whole, fit.weights, own)) if weight <= SMALL else new

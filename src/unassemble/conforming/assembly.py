@@ -67,11 +67,10 @@ class Entries:
                 sizes.append((block, [size[:, a] * size[:, b] for size in roots]))
         return _total(len(self._part.edges), sizes)
 
-    def flipped(self, z: NDArray) -> int:
-        """Cells that are not right side out at some point of the quadrature."""
+    def areas(self, z: NDArray) -> NDArray[np.float64]:
+        """Determinants of all cells at all points of the quadrature."""
         z = self.nodes(z)
-        turned = [(~(at.determinant > 0)).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
-        return int(sum(turned))
+        return np.concatenate([at.determinant.ravel() for block in self._blocks for _, at in block.parts(z)])
 
     def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
         """The derivative at z."""

@@ -10,24 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import SEARCHED_ROWS, Alternative
-from ..certify import Certificate
-from ..certify_elements import certify_elements
+from ..cells import Alternative
+from ..certify import Certificate, certify
 from ..clock import Clock
 from ..elements.surface import fields_of
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..recovery import ConformingMesh
-from ..scalar.held import Held
-from ..scalar.noise import Noise
+from ..recovery import ConformingMesh, PlanarMesh
+from ..scalar.noise import Noise, with_vanished
 from ..scalar.placement import Placement
-from ..scalar.solving import Task
-from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SMALL
+from ..scalar.recover import finished, small
+from ..scalar.solving import Solved, Task
+from ..scalar.verdict import Drawn
 from ..topology import Topology, local_numbering
-from ..topology.keys import contains, pair_keys
-from ..words import count_of, sentences
-from .fit import Fitted, deviations_of, fitted
+from ..topology.keys import distinct, pair_keys
+from .fit import Fitted, fitted
 from .parts import Part, parts_of, reversal
 from .roles import Cells, ordered_cells
 from .sets import node_sets
@@ -35,17 +33,17 @@ from .sets import node_sets
 
 def recover_conforming(
     stored: OperatorMatrix, shown: Iterable[Cells], placement: Placement, clock: Clock, options: ScalarOptions
-) -> ConformingMesh:
+) -> PlanarMesh:
     """The mesh of a checked scalar matrix, certified or the nearest.
 
     `shown`: see :func:`shown_cells`. Raises TopologyError if rows form no cells, GeometryError if the entries fit none
     that they form.
     """
-    task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
+    task = Task(options, placement, Noise.known(stored, options.noise))
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
-    best: ConformingMesh | None = None
-    remaining, even, small = iter(shown), False, stored.n <= SEARCHED_ROWS
-    while best is None or not best.certified or ((small or even) and best.uniqueness != "proved"):
+    best: PlanarMesh | None = None
+    remaining, even, all_of_it = iter(shown), False, small(stored)
+    while best is None or not best.certified or ((all_of_it or even) and best.uniqueness != "proved"):
         with clock("cells"):
             cells = next(remaining, None)
         if cells is None:
@@ -62,13 +60,10 @@ def recover_conforming(
             best = mesh
     if best is None:
         raise failure
-    if best.uniqueness == "searched" and not small:
-        note = f"other meshes were looked for in matrices of up to {SEARCHED_ROWS:,} rows only"
-        return replace(best, warnings=(*best.warnings, note))
     return best
 
 
-def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
+def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:
     """A mesh beside which another fits."""
     rows = [
         {frozenset(cell): tuple(cell) for some in mesh.cells.values() for cell in some.tolist()}
@@ -108,140 +103,62 @@ def shown_cells(
             yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
-def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
+def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> PlanarMesh:
     with clock("cells"):
         parts = parts_of(cells)
-    topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
+        matrix, topology = _with_zeros(stored, parts)
     with clock("positions"):
-        fits = [_fit(stored, part, task) for part in parts]
-    with clock("place"):
-        mesh = JoinedParts(topology, fits, task.placement)
-    with clock("certify"):
-        near = written = _held(stored, mesh, mesh.points, fits, task)
-        if mesh.origins.any():
-            written = _held(stored, mesh, mesh.written, fits, task)
-    with clock("deviations"):
-        bars = deviations_of(stored.n, fits, mesh.placed, task) if task.options.standard_deviations else None
-    status, uniqueness, reason = verdict(stored, fits, (near, written), task, told=cells.told)
-    freedom = sum(fit.freedom for fit in fits)
-    left = float(np.linalg.norm(written.certificate.differences))
-    return ConformingMesh(
-        **mesh.fields(),
-        **written.fields(10 if status == "uncertified" else 0),
-        node_status=(topology.multiplicity == 0).astype(np.int8),
-        status=status,
-        uniqueness=uniqueness,
-        reason=reason,
-        operator=task.placement.operator,
-        timings=clock.timings,
-        warnings=(*stored.warnings, *mesh.notes),
-        standard_deviations=bars,
-        estimated_noise=left / float(np.sqrt(freedom)) if freedom > 0 else None,
+        errors = with_vanished(topology, task.noise)
+        own = [piece.edge_rows for piece in topology.pieces]
+        fits = [fitted(part, -matrix.entries[o], errors[o], task) for part, o in zip(parts, own, strict=True)]
+    spare = np.array([fit.freedom for fit in fits])
+    least = np.array([piece.vertices.min() for piece in topology.pieces])
+
+    def drawn(placed: list[NDArray]) -> Drawn:
+        mesh = JoinedParts(topology, fits, placed, task.placement)
+        uniqueness = "proved" if cells.told else "searched"
+        return Drawn(
+            mesh.points,
+            list(mesh.blocks.values()),
+            lambda points: mesh.held(stored, points),
+            lambda: least[spare + (task.scale is not None) <= 0],
+            lambda _: ([], uniqueness),
+            ConformingMesh,
+            mesh.fields(),
+        )
+
+    models = [fit.entries for fit in fits]
+    return finished(Solved(stored, matrix, topology, fits, models, spare, task.noise), drawn, (), clock, task)
+
+
+def _with_zeros(stored: OperatorMatrix, parts: Sequence[Part]) -> tuple[OperatorMatrix, Topology]:
+    """The matrix with zeros for pairs of its cells that have no entry, and the parts as pieces with all their pairs."""
+    n, given = stored.n, stored.edges @ [stored.n, 1]
+    pairs = [pair_keys(n, *part.rows.T) for part in parts]
+    keys = distinct(np.concatenate([given, *pairs]))
+    edges, entries, old = np.column_stack([keys // n, keys % n]), np.zeros(len(keys)), np.searchsorted(keys, given)
+    entries[old] = stored.entries
+    pieces = tuple(
+        replace(part.piece, edge_rows=np.searchsorted(keys, own)) for part, own in zip(parts, pairs, strict=True)
     )
-
-
-def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
-    """A part with the positions that its entries give."""
-    place, there = part.stored_in(stored)
-    noise = None
-    if task.noise is not None:
-        noise = task.noise.sigma * np.where(there, task.noise.spread[place], SMALL)
-    weights = -np.where(there, stored.entries[place], 0.0)
-    return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
-
-
-def _held(stored: OperatorMatrix, mesh: JoinedParts, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
-    """A mesh with these points against the matrix, and against the errors of its entries."""
-    known = 1 if task.scale is not None else 0
-    scale = np.array([fit.scale for fit in fits])
-    return Held.of(mesh.held(stored, points), stored, task.noise, sum(fit.freedom + known for fit in fits), scale)
-
-
-def verdict(
-    stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool
-) -> tuple[str, str | None, str]:
-    """Status, uniqueness and reason of a mesh.
-
-    `fits`: its parts; `held` (Held, Held): the mesh about the origins of its parts, and as it is written; `told`:
-    whether the graph alone tells the cells.
-    """
-    near, written = held
-    reason = _obstacle(fits, near, task) or _bare(stored, fits)
-    if reason:
-        return "uncertified", None, reason
-    uniqueness = "proved" if told else "searched"
-    error = written.certificate.backward_error
-    if not written.passes:
-        why = (
-            f"the mesh fits, but not as it is written: so far from the origin its coordinates have too few digits, and "
-            f"the matrix is given back to {error:.1e} (relative) only"
-        )
-        return "uncertified", uniqueness, why
-    if written.test and written.by_noise:
-        p = written.test.figures["p_value"]
-        return "certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})"
-    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-    return "certified", uniqueness, fits_well
-
-
-def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
-    """What speaks against a mesh, the gravest first; empty if nothing does."""
-    certificate, test = near.certificate, near.test
-    notes = list(dict.fromkeys(note for fit in fits for note in fit.notes))
-    if len(certificate.flipped):
-        turned = count_of(len(certificate.flipped), "cell is", "cells are") + " flat, not convex or turned over"
-        return sentences((turned, *notes))
-    known = task.scale is not None
-    loose = [fit for fit in fits if fit.freedom + known <= 0]
-    if loose:
-        row = int(loose[0].part.piece.vertices.min())
-        return f"the part of row {row} has no more entries than unknowns, so that it fits proves nothing"
-    if test and near.by_noise:
-        if test.drowned:
-            return f"noise above {test.limit:.2g} ({LARGEST_NOISE:g} of c) drowns what the entries say of angles"
-        if test.coincidence:
-            return "entries of so few digits may fit by chance"
-        if not test.likely:
-            p = min(test.figures["p_value"], test.figures["largest_p_value"])
-            large = f"the misfit is too large for {test.noise} (p = {p:.1e}, where {CONFIDENCE:g} is allowed)"
-            return sentences((large, *notes))
-        return sentences(("the mesh that fits need not be the likeliest", *notes)) if notes else ""
-    if not near.passes:
-        (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-        differs = (
-            f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
-            f"largest, where {CERTIFIED:g} is allowed)"
-        )
-        return sentences((differs, *notes))
-    return ""
-
-
-def _bare(stored: OperatorMatrix, fits: Sequence[Fitted]) -> str:
-    """A stored entry of no cell; empty if there is none."""
-    covered = [pair_keys(stored.n, *fit.part.rows.T) for fit in fits]
-    bare = np.flatnonzero(~contains(np.sort(np.concatenate(covered)), stored.edges @ [stored.n, 1]))
-    if not len(bare):
-        return ""
-    i, j = stored.edges[bare[0]]
-    return f"the mesh gives the matrix back, but the stored zero of rows {i} and {j} belongs to no cell"
+    vanished = np.delete(np.arange(len(keys)), old)
+    return replace(stored, edges=edges, entries=entries), Topology(n, edges, pieces, "cliques", vanished=vanished)
 
 
 class JoinedParts:
     """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
 
-    def __init__(self, topology: Topology, fits: Sequence[Fitted], placement: Placement):
-        """Parts are the pieces of the topology."""
-        n = topology.n_vertices
-        self.points = np.full((n, 2), np.nan)  # of each about its origin
+    def __init__(
+        self, topology: Topology, fits: Sequence[Fitted], placed: Sequence[NDArray[np.complex128]], placement: Placement
+    ):
+        """Parts are the pieces of the topology, at positions `placed`."""
+        self.points = np.full((topology.n_vertices, 2), np.nan)
         self.component = topology.component
         self.blocks: dict[str, NDArray[np.int64]] = {}
         self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
-        self._topology, self._fits, self._tensor = topology, fits, placement.tensor
-        self._stretch = placement.stretch
-        nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
-        self.placed, self.origins, self.notes = placement.placed(topology, nodes, remarks)
+        self._fits, self._placement = fits, placement
         for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
-            part, z = fits[label].part, self.placed[label]
+            part, z = fits[label].part, placed[label]
             self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
             a, b, c = z[part.piece.triangles].T
             mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
@@ -251,26 +168,18 @@ class JoinedParts:
                 self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
                 self._piece[name] = np.concatenate([piece, self._piece.get(name, piece[:0])])
 
-        shift = self.origins[self.component]
-        self.written = self.points + np.column_stack([shift.real, shift.imag])
-
     def held(self, matrix: OperatorMatrix, points: NDArray) -> Certificate:
         """The mesh with these points against the matrix."""
-        if self._tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
-            z = self._tensor.to_laplacian(points @ [1, 1j])
-            points = np.column_stack([z.real, z.imag])
-        scale = np.array([fit.scale for fit in self._fits])
-        factors = {name: scale[piece] for name, piece in self._piece.items()}
+        scale = np.array([fit.scale for fit in self._fits]) / self._placement.stretch
+        factors, given = {name: scale[piece] for name, piece in self._piece.items()}, (matrix.edges, matrix.entries)
         rules = {name: rule for fit in self._fits for name, rule in fit.rule.items()}
-        return certify_elements(matrix.edges, matrix.entries, points, self.blocks, factors, rules)
+        return certify(*given, points, self.blocks, factors, rules=rules, tensor=self._placement.coefficients)
 
     def fields(self) -> dict[str, Any]:
         """What results say of the mesh, under the names that they have for it."""
         return fields_of(self.blocks) | {
-            "points": self.written,
             "component": self.component,
-            "hinges": self._topology.hinges,
-            "scale": np.array([fit.scale for fit in self._fits]) / self._stretch,
+            "scale": np.array([fit.scale for fit in self._fits]) / self._placement.stretch,
             "n_holes": sum(fit.part.n_holes for fit in self._fits),
             "quadrature": ", ".join(dict.fromkeys(rule for fit in self._fits for rule in fit.rule.values())),
             "straight": all(fit.straight for fit in self._fits),

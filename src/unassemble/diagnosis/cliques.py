@@ -6,7 +6,6 @@ pairs, of six for quadratic triangles, and so on. Neighbouring cells share the n
 tetrahedra have no such pairs inside of a mesh; of the latter nearly every pair lies in a clique of four.
 """
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,30 +61,24 @@ def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
     pairs = pairs[inner[pairs].any(axis=1)] if inner.any() else pairs
     most = min(most, max(100, int(AT_ONCE / max(np.diff(near.indptr).mean(), 1) ** 2)))  # each takes a degree squared
     pairs = np.random.default_rng(0).permutation(pairs)[:most]  # every second one may be all of one kind, on a grid
-    others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
-    found: Counter[int] = Counter()
-    cells: set[frozenset[int]] = set()
-    fours = threes = around = 0.0
-    for i, j in pairs.tolist():
-        common = others[i] & others[j]
-        threes += bool(common)
-        inside = [len(common & others[k]) for k in common]
-        fours += any(inside)
-        around += sum(inside) / max(len(inside), 1)
-        if common and min(inside) == len(common) - 1:
-            found[len(common) + 2] += 1
-            cells.add(frozenset(common | {i, j}))
-    size, count = found.most_common(1)[0] if found else (0, 0)
-    told = count >= MOST * found.total() and count >= _OFTEN * len(pairs)
+    i, j = pairs.T
+    common = sp.csr_array(near[i].multiply(near[j]))  # (pairs, rows)
+    count, within = common.sum(axis=1), sp.csr_array((common @ near).multiply(common)).sum(axis=1)
+    clique = (count > 0) & (within == count * (count - 1))
+    found = np.bincount(count[clique], minlength=1)
+    size = int(found.argmax()) + 2
+    told = found.max() >= max(MOST * found.sum(), _OFTEN * len(pairs), 1)
     shared = 0
     if told:
-        alike = [sorted(cell) for cell in cells if len(cell) == size]
-        held = sp.csr_array((np.ones(size * len(alike)), np.ravel(alike), size * np.arange(len(alike) + 1)))
-        shared = int((held @ held.T - size * sp.eye_array(len(alike))).max())
+        ends = np.tile(np.arange(len(pairs)), 2), np.concatenate([i, j])
+        nodes = common + sp.csr_array((np.ones(len(ends[0]), np.int32), ends), shape=common.shape)
+        overlap = (nodes := nodes[clique & (count == size - 2)]) @ nodes.T
+        shared = int(overlap.data.max(initial=0, where=overlap.data < size))
     keys = np.random.default_rng(0).integers(2**40, size=near.shape[0])
     key = near @ keys + keys  # of equal neighbourhoods equal; and exact, in integers
     _, which, alone = np.unique(key, return_inverse=True, return_counts=True)
-    often, fours, threes, around = (one / len(pairs) for one in (count, fours, threes, around))
+    shares = found.max() / len(pairs), (within > 0).mean(), (count > 0).mean(), (within / np.maximum(count, 1)).mean()
+    often, fours, threes, around = map(float, shares)
     return Cells(size if told else 0, shared, often, fours, threes, around, float((alone[which] > 1).mean()))
 
 

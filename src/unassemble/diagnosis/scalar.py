@@ -117,8 +117,8 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
     if not found.unread:
-        if linear or mesh.chi_square is not None or mesh.backward_error <= CERTIFIED:
+        if linear or mesh.chi_square is not None or mesh.uniqueness or mesh.backward_error <= CERTIFIED:
             return mesh
         advice = _where_nothing_fits(found, matrix)
-        return replace(mesh, reason=sentences([mesh.reason, *found.evidence[-1:]]), advice=advice)
+        return replace(mesh, reason=sentences([mesh.reason.split(". ")[0], *found.evidence[-1:]]), advice=advice)
     return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Certificate, Terms, certify
-from ..certify_elements import certify_elements
 from ..matrix import OperatorMatrix
 from ..recovery import ConformingMesh, PlanarMesh
 from ..tolerances import CERTIFIED, SIGMAS
@@ -78,10 +77,12 @@ class Held:
         given = self.matrix.edges, self.matrix.entries, found.points
         if not isinstance(found, ConformingMesh):
             triangles = found.divided()[0]
-            return certify(*given, triangles, factor(triangles), self.tensor, terms)
+            return certify(
+                *given, {"triangle": triangles}, {"triangle": factor(triangles)}, tensor=self.tensor, terms=terms
+            )
         rules = {
             name: next(rule for rule in found.quadrature.split(", ") if ("Gauss" in rule) == name.startswith("quad"))
             for name in found.cells
         }
         factors = {name: factor(cells) for name, cells in found.cells.items()}
-        return certify_elements(*given, found.cells, factors, rules, terms)
+        return certify(*given, found.cells, factors, rules=rules, terms=terms)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,17 @@ from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from ..topology.surface import Together
 from .conformal import conformal_map
-from .cotangent import corner_sides, cotangent, edge_weights, weight_roundings
-from .polish import CAREFUL, MOST_CAREFUL, PolishedMesh, count_flipped, errors_of_one_size, polish
+from .cotangent import corner_sides, cotangent, edge_weights
+from .polish import (
+    CAREFUL,
+    MOST_CAREFUL,
+    Model,
+    PolishedMesh,
+    count_flipped,
+    errors_of_one_size,
+    model_of,
+    polish,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +37,11 @@ class PieceMesh:
     spread: NDArray[np.float64] | None = None
     # about the error of z relative to its extent, where a polish came to no end for reasons of conditioning
     doubt: float = 0.0
+
+    @property
+    def nodes(self) -> NDArray[np.complex128]:
+        """Positions of all nodes."""
+        return self.z
 
 
 def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: bool) -> PieceMesh:
@@ -60,51 +75,56 @@ def left_by_map(piece: Piece, weights: NDArray, scale: float | None = None) -> t
         return mesh.scale, weights / mesh.scale - edge_weights(piece, mesh.z)
 
 
+Placed = TypeVar("Placed", bound=PieceMesh)
+
+
 def refined(
-    piece: Piece,
+    drawn: Piece | Model,
     weights: NDArray,
-    mesh: PieceMesh,
+    mesh: Placed,
     *,
     scale: float | None,
     rounding: bool,
     noise: NDArray[np.float64] | None = None,
-) -> PieceMesh:
+) -> Placed:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
     `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
     `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
     and more likely to be such noise. Without it the noise is known, and tested.
     """
+    model = model_of(drawn)
     noise = None if noise is None or (noise == 1).all() else noise
-    spread = weight_roundings(piece, mesh.z) if rounding else noise
+    spread = model.roundings(mesh.z) if rounding else noise
     try:
-        found = _polished(piece, weights, mesh.z, scale, spread)
-        misfit = weights / found.scale - edge_weights(piece, found.z)
+        found = _polished(model, weights, mesh.z, scale, spread)
+        misfit = weights / found.scale - model.weights(found.z)
         if rounding and spread is not None and errors_of_one_size(misfit, spread):
             spread = noise
-            found = _polished(piece, weights, found.z, scale, spread)
+            found = _polished(model, weights, found.z, scale, spread)
     except SolverError as error:
         return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
-    if found.converged:
-        return PieceMesh(found.z, found.scale, mesh.notes, spread)
-    note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
-    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
+    notes, doubt = mesh.notes, 0.0
+    if not found.converged:
+        doubt = found.last_step
+        notes += (f"the polish did not converge: its last step moved points by {doubt:.0e} of the size",)
+    return replace(mesh, z=found.z, scale=found.scale, notes=notes, spread=spread, doubt=doubt)
 
 
 def _polished(
-    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
+    model: Model, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
 ) -> PolishedMesh:
     """By the chord iteration; where it comes to no end, by small steps from the better of start and result.
 
     Rounding in the normal equations of long thin pieces is one reason for that.
     """
-    found = polish(piece, weights, start, scale=scale, spread=spread)
+    found = polish(model, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
-    flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
-    if (found.converged and not flipped) or piece.n_vertices > MOST_CAREFUL:
+    flipped = count_flipped(model, found.z) if finite else np.inf
+    if (found.converged and not flipped) or model.n > MOST_CAREFUL:
         return found
-    nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = polish(piece, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
+    nearest = found.z if flipped <= count_flipped(model, start) else start
+    again = polish(model, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
     return again if again.residual < found.residual or not finite else found
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -20,8 +21,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
-from .cotangent import areas, edge_weights
-from .iterative import IterativeNormalEquations
+from .cotangent import areas, edge_weights, weight_roundings
 from .normal import GaussNewton, Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ class PolishOptions:
     # the iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
     # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
-    direct_limit: int = 1_500_000  # above so many vertices conjugate gradients take a tenth of the memory
+    most_vertices: int = 1_500_000  # the factor of larger meshes takes more memory than most machines have
     careful: bool = False  # a factorisation for each step, which is cut short before a triangle turns over
 
 
@@ -65,28 +65,41 @@ class PolishedMesh:
 
 
 class Model(Protocol):
-    """Weights of a mesh as a function of its positions, with their derivative."""
+    """Weights of a mesh as a function of positions z, (n,) complex, with their derivative."""
+
+    n: int
+
+    def nodes(self, z: NDArray) -> NDArray:
+        """Positions, or displacements, of all nodes, of which those of z come first."""
 
     def weights(self, z: NDArray) -> NDArray[np.float64]:
-        """(e,) w for positions z (n,) complex; not finite where cells are flat."""
+        """(e,) w; not finite where cells are flat."""
+
+    def roundings(self, z: NDArray) -> NDArray[np.float64]:
+        """(e,) size of the rounding errors of assembled weights, in units of the machine precision."""
+
+    def areas(self, z: NDArray) -> NDArray[np.float64]:
+        """Of cells, or of all parts of them, positive for the orientation that prevails."""
 
     def jacobian(self, z: NDArray, spread: NDArray) -> Jacobian:
         """dw / d(x, y), each row divided by the standard deviation of its weight."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cotangents:
+class _Cotangents:
     """The weights of linear triangles."""
 
-    piece: Piece
+    def __init__(self, piece: Piece):
+        self.n, self._piece = piece.n_vertices, piece
+        self.weights = partial(edge_weights, piece)
+        self.roundings = partial(weight_roundings, piece)
+        self.jacobian = partial(WeightJacobian, piece)
 
-    def weights(self, z: NDArray) -> NDArray[np.float64]:
-        """See :func:`.cotangent.edge_weights`."""
-        return edge_weights(self.piece, z)
+    def nodes(self, z: NDArray) -> NDArray:
+        return z
 
-    def jacobian(self, z: NDArray, spread: NDArray) -> Jacobian:
-        """See :class:`.normal.WeightJacobian`."""
-        return WeightJacobian(self.piece, z, spread)
+    def areas(self, z: NDArray) -> NDArray[np.float64]:
+        signed = areas(self._piece, z)
+        return signed if signed.sum() >= 0 else -signed
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,14 +165,16 @@ def polish(
     it is fitted; `spread` (e,): standard deviations of the errors of a up to a common factor, for instance
     :func:`~unassemble.planar.cotangent.weight_roundings`, of one size by default.
 
-    Raises SolverError if cells are flat at the start.
+    Raises SolverError if cells are flat at the start, or there are too many.
     """
     options = options or PolishOptions()
+    if len(z) > options.most_vertices:
+        raise SolverError(f"it has more than {options.most_vertices:,} vertices")
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
     spread = np.ones(len(weights)) if spread is None else spread
-    model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
+    model = model_of(drawn)
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
     if not np.isfinite(fit.weights).all():
@@ -174,8 +189,6 @@ def polish(
         if system is None:
             if equations is not None:
                 equations.renew(jacobian)
-            elif isinstance(jacobian, WeightJacobian) and len(z) > options.direct_limit:
-                equations = IterativeNormalEquations(jacobian)
             else:
                 equations = NormalEquations(jacobian, pins)
             system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
@@ -191,10 +204,10 @@ def polish(
             system, length = None, np.inf
             continue
         change, share = float(np.linalg.norm(jacobian.forward(move))), 1.0
-        if options.careful and isinstance(drawn, Piece):
-            system, before = None, signed_areas(drawn, fit.z)
-            while share > 1e-4 and (signed_areas(drawn, fit.z + share * move) < 0.1 * before)[before > 0].any():
-                share /= 2  # a triangle would lose most of its area
+        if options.careful:
+            system, before = None, model.areas(fit.z)
+            while share > 1e-4 and (model.areas(fit.z + share * move) < 0.1 * before)[before > 0].any():
+                share /= 2  # a cell would lose most of its area
         better = downhill(problem, fit, share * move)
         steps += 1
         _log.debug("polish step %d: length %.1e, misfit %.3e", steps, length, fit.norm)
@@ -214,15 +227,14 @@ def polish(
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, factorisations, converged, length)
 
 
-def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
-    """Twice the area of each triangle (m,), positive for the orientation that prevails."""
-    signed = areas(piece, z)
-    return signed if signed.sum() >= 0 else -signed
+def model_of(drawn: Piece | Model) -> Model:
+    """That of a piece of linear triangles, or of other cells as it is."""
+    return _Cotangents(drawn) if isinstance(drawn, Piece) else drawn
 
 
-def count_flipped(piece: Piece, z: NDArray) -> int:
-    """Number of triangles that are flat, or turned over relative to the others."""
-    return int(np.count_nonzero(~(signed_areas(piece, z) > 0)))
+def count_flipped(drawn: Piece | Model, z: NDArray) -> int:
+    """Number of triangles, or parts of other cells, that are flat, or turned over relative to the others."""
+    return int(np.count_nonzero(~(model_of(drawn).areas(z) > 0)))
 
 
 def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:

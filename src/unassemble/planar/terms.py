@@ -40,7 +40,7 @@ def lacking_term(
     to a factor; 1 by default; `free_scale`: whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
-    if freedom < 3 or piece.n_vertices > PolishOptions().direct_limit:
+    if freedom < 3 or piece.n_vertices > PolishOptions().most_vertices:
         return None
     names, terms = _terms(piece, z)
     count = min(len(names), freedom // 3)  # of few entries the first ones only

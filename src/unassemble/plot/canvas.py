@@ -25,33 +25,18 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
         figure.savefig(draft, format=suffix[1:], dpi=style.DPI, metadata=metadata)
 
 
-def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
-    """A figure with one box beside the other, all to one scale, for what each extent (2, 2) encloses."""
-    sizes = np.array([high - low for low, high in extents])
-    sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
-    gap = style.PAGE.margin * 2 * (len(extents) - 1)
-    room = np.array(style.PAGE.largest) * (1 + 0.4 * (len(extents) > 1), 1)
-    sizes *= min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
-    height = float(sizes[:, 1].max())
-    content = float(sizes[:, 0].sum() + gap)
-    width = max(content, style.PAGE.narrowest)
-    total = np.array([width + 2 * style.PAGE.margin, height + style.PAGE.header + style.PAGE.footer])
-    figure = Figure(figsize=(float(total[0]), float(total[1])), facecolor="white")
-    axes, left = [], style.PAGE.margin + (width - content) / 2
-    for (low, high), size in zip(extents, sizes, strict=True):
-        bottom = style.PAGE.footer + (height - size[1]) / 2
-        ax = figure.add_axes((left / total[0], bottom / total[1], size[0] / total[0], size[1] / total[1]))
-        axes.append(_showing(ax, low, high))
-        left += size[0] + 2 * style.PAGE.margin
-    return figure, axes
-
-
 def panel(extent: NDArray, ax: Axes | None) -> tuple[Figure, Axes]:
     """A box for what `extent` (2, 2) encloses: an axes of the caller's, or that of a figure of its own."""
-    if ax is None:
-        figure, (ax,) = panels([extent])
-        return figure, ax
-    return _showing(ax, *extent).figure, ax  # type: ignore[return-value]
+    low, high = extent
+    if ax is not None:
+        return _showing(ax, low, high).figure, ax  # type: ignore[return-value]
+    size = np.maximum(high - low, 1e-3 * max(float((high - low).max()), 1e-300))
+    size *= (np.array(style.PAGE.largest) / size).min()
+    width = max(float(size[0]), style.PAGE.narrowest)
+    total = np.array([width + 2 * style.PAGE.margin, size[1] + style.PAGE.header + style.PAGE.footer])
+    figure = Figure(figsize=(float(total[0]), float(total[1])), facecolor="white")
+    corner = np.array([style.PAGE.margin + (width - size[0]) / 2, style.PAGE.footer])
+    return figure, _showing(figure.add_axes((*(corner / total), *(size / total))), low, high)
 
 
 def _showing(ax: Axes, low: NDArray, high: NDArray) -> Axes:

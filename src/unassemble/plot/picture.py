@@ -1,4 +1,4 @@
-"""A recovered mesh as a picture, alone or beside the true one."""
+"""A recovered mesh as a picture."""
 
 import os
 
@@ -6,19 +6,17 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
 
 from ..clock import Clock
-from ..errors import FormatError, InputError
+from ..errors import FormatError
 from ..files import check_plot
 from ..metric import realised
-from ..planar import fit_similarity
 from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
 from .body import plot_body
-from .canvas import footer, header, laid_out, panel, panels, write_figure
+from .canvas import footer, header, laid_out, panel, write_figure
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
 
 
@@ -73,52 +71,3 @@ def _details(recovery: Recovery) -> str:
         parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")
     parts.append(f"backward error {recovery.backward_error:.1e}")
     return "  ·  ".join(parts)
-
-
-def plot_comparison(true_points: ArrayLike, recovery: PlanarMesh, path: str | os.PathLike[str] | None = None) -> Figure:
-    """Draw the true mesh beside the recovered one, each piece moved by the best similarity or reflection.
-
-    Row i of `true_points`, (n, 2) array_like, belongs to matrix row i; `path` is as in :func:`plot_recovery`.
-
-    Raises InputError if `true_points` has another shape, or `recovery` is no planar mesh; OutputError if the file
-    cannot be written.
-    """
-    if path is not None:
-        check_plot(path)
-    truth = np.asarray(true_points, dtype=np.float64)
-    if not isinstance(recovery, PlanarMesh):
-        raise InputError("only planar meshes are drawn beside the true ones")
-    if truth.shape != recovery.points.shape:
-        raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
-    aligned = align(recovery.points, truth, recovery.component)
-    figure, axes = panels([extent(truth, recovery.component >= 0)] * 2)
-    outer = outer_loops(recovery)  # in the frame in which cells are counter-clockwise
-    handles = []
-    for ax, points, name in zip(axes, (truth, aligned), ("true", "recovered"), strict=True):
-        handles = draw_mesh(ax, recovery, points, outer)
-        ax.set_title(name, color=style.TEXT, size=9.5, style="italic", pad=3)
-    headline = f"{recovery.status}, largest error {largest_error(aligned, truth):.1e} of the diameter"
-    header(figure, headline, _details(recovery), style.STATUS.get(recovery.status, style.TEXT))
-    footer(figure, handles)
-    if path is not None:
-        write_figure(figure, path)
-    return figure
-
-
-def align(points: NDArray, truth: NDArray, component: NDArray) -> NDArray[np.float64]:
-    """Move each piece onto the true points by least squares over similarities, mirror images included."""
-    aligned = np.array(points)
-    for label in np.unique(component[component >= 0]):
-        rows = component == label
-        source, target = points[rows] @ [1, 1j], truth[rows] @ [1, 1j]
-        fits = [fit_similarity(source, target, mirror=mirror) for mirror in (False, True)]
-        moved = min(fits, key=lambda fit: fit[1])[0](source)
-        aligned[rows] = np.column_stack([moved.real, moved.imag])
-    return aligned
-
-
-def largest_error(aligned: NDArray, truth: NDArray) -> float:
-    """Largest distance between points, relative to the diagonal of the box around the true ones."""
-    rows = np.isfinite(aligned).all(axis=1)
-    distance = np.linalg.norm(aligned[rows] - truth[rows], axis=1)
-    return float(distance.max() / np.linalg.norm(np.ptp(truth[rows], axis=0)))

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Certificate
-from ..planar.cotangent import edge_weights, weight_roundings
 from ..planar.terms import Term, lacking_term
 from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, SUMMED
 from .solving import Solved
@@ -39,7 +38,8 @@ def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search:
     noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
     suspects = _standing_out(solved) if search else NONE
     term = None
-    if noise and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
+    linear = solved.topology.method != "cliques"
+    if noise and linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
         term = _term(solved, noise, free_scale=free_scale)
     return Evidence(None if term else noise, suspects, term)
 
@@ -49,8 +49,7 @@ def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
     if not noise <= LARGEST_NOISE * np.abs(solved.scales).min() or (solved.noise and solved.noise.digits):
         return None
     found = []
-    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
-        weights = -solved.matrix.entries[piece.edge_rows]
+    for piece, (weights, _, mesh) in zip(solved.topology.pieces, solved.fits, strict=True):
         term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
         found += [] if term is None else [term]
     least = min(found, key=lambda term: term.probability, default=None)
@@ -60,8 +59,8 @@ def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
 def pooled_noise(solved: Solved, freedom: int) -> float:
     """Common factor of the standard deviations of the entries' errors, in the norms that the pieces were fitted in."""
     norms = []
-    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
-        misfit = solved.matrix.entries[piece.edge_rows] + mesh.scale * edge_weights(piece, mesh.z)
+    for weights, model, mesh in solved.fits:
+        misfit = weights - mesh.scale * model.weights(mesh.z)
         norms.append(_norm(misfit if mesh.spread is None else misfit / mesh.spread))
     return _norm(np.array(norms)) / float(np.sqrt(max(freedom, 1)))
 
@@ -80,12 +79,12 @@ def _standing_out(solved: Solved) -> NDArray[np.int64]:
     gone = np.zeros(len(solved.topology.edges), dtype=bool)
     gone[solved.topology.vanished] = True  # these are exact
     found = [NONE]
-    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
+    for piece, (weights, model, mesh), spare in zip(solved.topology.pieces, solved.fits, solved.spare, strict=True):
         with np.errstate(all="ignore"):  # flat triangles
-            left = -solved.matrix.entries[piece.edge_rows] / mesh.scale - edge_weights(piece, mesh.z)
-            rounding = weight_roundings(piece, mesh.z)
+            left = weights / mesh.scale - model.weights(mesh.z)
+            rounding = model.roundings(mesh.z)
             squares = (left / (rounding if mesh.spread is None else mesh.spread)) ** 2
-            if piece.redundancy < _SPARE or (solved.noise is None and _norm(left / rounding) <= SUMMED):
+            if spare < _SPARE or (solved.noise is None and _norm(left / rounding) <= SUMMED):
                 continue
         squares[gone[piece.edge_rows]] = 0.0
         most = squares.max()

@@ -26,11 +26,6 @@ class JoinedMesh:
     boundary: NDArray[np.int64]  # (b, 2) directed edges with the mesh on their left, loop by loop
     boundary_offsets: NDArray[np.int64]  # (loops + 1,)
 
-    def shifted(self, origins: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """(n, 2) the points with the origin of each piece, (pieces,), added."""
-        shift = origins[self.component]
-        return self.points + np.column_stack([shift.real, shift.imag])
-
     def fields(self, *, triangulate: bool = False) -> dict[str, Any]:
         """What every planar mesh's recovery says of cells, pieces and boundary; polygons in triangles on request."""
         polygons = Polygons.none() if triangulate else self.polygons

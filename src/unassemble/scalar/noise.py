@@ -76,6 +76,10 @@ class NoiseTest:
         figures = chi_square_verdict(misfit, freedom, noise.sigma, repeats=noise.repeats)
         return cls(noise, freedom, figures, LARGEST_NOISE * float(np.abs(factors).min()), int(np.abs(misfit).argmax()))
 
+    def __str__(self) -> str:
+        figures = [self.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value")]
+        return "(chi-square {:.4g} with {:.4g} degrees of freedom, p = {:.3g})".format(*figures)
+
     @property
     def drowned(self) -> bool:
         """Whether almost any mesh would pass."""

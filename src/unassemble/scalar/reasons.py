@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +12,13 @@ from numpy.typing import NDArray
 from ..cells import Alternative
 from ..certify import Certificate
 from ..planar.terms import COEFFICIENT, MASS, Term
-from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE
-from ..topology import Topology
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of
-from .evidence import Evidence
 from .noise import NoiseTest
+from .solving import Solved, leaders
 
 if TYPE_CHECKING:
     from .verdict import Findings
-
-_MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
 _ONE_COEFFICIENT = "see whether a coefficient varies from cell to cell, the surface is curved or it is a network"
@@ -29,147 +27,136 @@ _LEAVE_SCALE = "leave out `scale`: it is found where it is not given"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
 
-def misfit(f: Findings, notes: Sequence[str]) -> Reason:
-    """What does not fit, the gravest first; `notes` are stages that did not converge."""
-    topology, certificate, evidence = f.solved.topology, f.certificate, f.evidence
+def objections(f: Findings) -> Iterator[tuple[str, str]]:
+    """All that speaks against a mesh, the gravest first, each with what to do about it; nothing where it is right."""
+    apart = _discord(f.solved, f.certificate.backward_error)
+    yield from _doubts(f, apart) if f.near.passes else _misfits(f, apart)
+
+
+def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
+    """What leaves a mesh in doubt although it fits."""
+    topology, error, allowed = f.solved.topology, f.certificate.backward_error, PLACED
+    doubt = max(mesh.doubt for mesh in f.solved.meshes)
+    if apart:
+        yield f"the matrix is given back to {error:.1e} (relative), but {apart}", ""
+    if f.test:
+        allowed = max(PLACED, f.test.noise.sigma / float(np.abs(f.solved.scales).min()))
+        if f.evidence.term:
+            yield from _lacking(f, f.evidence.term)
+    if not doubt <= allowed:
+        yield f"{f.fits}, but points are known to about {doubt:.0e} of the size only", ""
+        yield from ((note, "") for note in f.trouble)
+    if len(topology.bare_edges) and not f.test:
+        i, j = topology.edges[topology.bare_edges[0]]
+        advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
+        yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice
+    if len(rows := f.mesh.loose()):
+        one = f"the piece of row {rows[0]} has" if len(rows) == 1 else f"{len(rows)} pieces, as of row {rows[0]}, have"
+        proves = (
+            f"nearly any entries belong to such a mesh, and that it gives the matrix back to {error:.1e} (relative)"
+        )
+        yield (
+            f"{one} no entry to spare: {proves} proves nothing",
+            "" if f.known_scale else "give `scale` if it is known",
+        )
+
+
+def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
+    """What does not fit, and what it looks like."""
+    topology, stored, certificate, test = f.solved.topology, f.solved.stored, f.certificate, f.test
+    if test and test.drowned:
+        much = f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
+        yield f"{much}{test.limit:.2g}, {LARGEST_NOISE:g} times the scale", "give less noise, if entries are that good"
+        return
+    without = stored.incomplete_rows.any()
+    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if stored.adds_up.all() else _CHECK_MODEL
+    model = _LEAVE_SCALE if f.known_scale else model
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
-        return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
-    without = f.stored.incomplete_rows.any()
-    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if f.stored.adds_up.all() else _CHECK_MODEL
-    model = _LEAVE_SCALE if f.known_scale else model
+        yield f"{parts} no mesh: {topology.failures[0]}", _CHECK_MODEL
+        return
+    if apart and not test:
+        yield apart, model
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
         some = count_of(len(bare), "nonzero entry belongs", "nonzero entries belong")
-        return Reason.of(f"{some} to no triangle, the first that of rows {i} and {j}", advice=model)
-    if len(certificate.flipped):
-        return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
+        yield f"{some} to no triangle, the first that of rows {i} and {j}", model
+        return
+    if len(flipped := certificate.flipped):
+        some = count_of(len(flipped), "cell is", "cells are")
+        rows = words_of(np.sort(next(islice(chain(*f.mesh.cells), int(flipped[0]), None))))
+        yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
+    elif f.evidence.term and (test or not f.known_scale):
+        yield from _lacking(f, f.evidence.term)
+    elif len(f.evidence.suspects):
+        i, j = f.evidence.suspects[0]
+        said = f"the entry of rows {i} and {j} stands out from the misfit of all others"
+        yield said, "check the entries that stand out, which the report lists"
+    if test:
+        if test.likely and test.coincidence:
+            chance = "there are too few different entries beyond the unknowns to tell that from chance"
+            yield f"{f.fits}, but {chance}", "write the entries with more digits"
+        if not test.likely:
+            yield _unlikely(f, test), "check the noise, and the entries"
+        yield _astray(f), ""
+    elif remark := _like_noise(f):
+        if without:
+            yield "only some rows add up to zero, as next to unknowns that were eliminated", _KEEP_ROWS
+        elif stored.adds_up.all():
+            yield "all rows add up to zero, which errors of single entries would not leave", _ONE_COEFFICIENT
+        else:
+            yield remark, _GIVE_NOISE
+    yield from ((note, "") for note in f.trouble)
     (i, j), largest = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-    differs = (
-        f"the re-assembled matrix differs most in the entry of rows {i} and {j}, by {largest:.1e} of the row's largest "
-        f"entry where {CERTIFIED:g} is allowed"
-    )
-    if evidence.term and not f.known_scale:
-        return lacking(f, evidence.term)
-    if stands_out := _culprits(evidence):
-        return Reason.of(stands_out, *notes, differs, advice="check the entries that stand out, which the report lists")
-    if without:
-        return Reason.of(
-            _unexplained(certificate) or differs,
-            "only some rows add up to zero, as next to unknowns that were eliminated",
-            advice=_KEEP_ROWS,
-        )
-    remark = _like_noise(certificate, evidence, f.solved.scales)
-    if remark and f.stored.adds_up.all():
-        return Reason.of(
-            differs,
-            "all rows add up to zero, which errors of single entries would not leave",
-            advice=_ONE_COEFFICIENT,
-        )
-    if remark:
-        return Reason.of(remark, differs, *notes, advice=_GIVE_NOISE)
-    return Reason.of(_unexplained(certificate), differs, *notes, advice=model)
+    most = f"by {largest:.1e} of the row's largest entry where {CERTIFIED:g} is allowed"
+    yield f"the re-assembled matrix differs most in the entry of rows {i} and {j}, {most}", model
 
 
-def lacking(f: Findings, term: Term) -> Reason:
-    """The reason of a misfit that a term explains which the model does not have."""
+def _lacking(f: Findings, term: Term) -> Iterator[tuple[str, str]]:
+    """That a term explains a misfit which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
-    begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
-    if term.name == COEFFICIENT or f.stored.adds_up.all():  # with a mass matrix, or one number added, rows do not
+    which, advice = "most entries are off in one direction", _CHECK_MODEL
+    if (
+        term.name == COEFFICIENT or f.solved.stored.adds_up.all()
+    ):  # with a mass matrix, or one number added, they do not
         which = "a coefficient that varies in space leaves such, and a constant one is assumed"
-        return Reason.of(begun, which, advice="assemble the matrix with a constant coefficient")
-    if term.name == MASS:
+        advice = "assemble the matrix with a constant coefficient"
+    elif term.name == MASS:
         which = "it has the form of a mass matrix, and the rows do not add up to zero: A = c L + s M"
-        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
-    return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
+        advice = "assemble the stiffness matrix alone, or lump the mass matrix"
+    yield f"the misfit is no noise, since a term that the model lacks explains {share} of its square", advice
+    yield which, ""
 
 
-def _culprits(evidence: Evidence) -> str:
-    """The sentence on entries that are to blame; empty where none are."""
-    if not len(evidence.suspects):
+def _like_noise(f: Findings) -> str:
+    """That the misfit is small and nowhere concentrated; empty where it is not."""
+    size, noise = np.abs(f.certificate.differences), f.evidence.noise
+    if not (noise and noise <= LARGEST_NOISE * np.abs(f.solved.scales).min()):
         return ""
-    i, j = evidence.suspects[0]
-    return f"the entry of rows {i} and {j} stands out from the misfit of all others"
+    small = size.max() <= 8 * np.sqrt(np.mean(size**2))
+    return f"noise of standard deviation {noise:.2g} (absolute) in the entries would leave as much" if small else ""
 
 
-def _unexplained(certificate: Certificate) -> str:
-    """The sentence where no few entries are to blame; empty where little is left."""
-    if certificate.backward_error <= ALIKE:
-        return ""
-    count, whole = int((certificate.misfits > ALIKE).sum()), len(certificate.misfits)
-    left = "1 entry is" if count == 1 else f"{count:,} entries are"
-    return f"no set of cells was found that fits: {left} left unexplained, of {whole:,}"
-
-
-def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) -> str:
-    """The remark that the misfit is small and nowhere concentrated; of few entries that cannot be said."""
-    size = np.abs(certificate.differences)
-    if not evidence.noise or not evidence.noise <= LARGEST_NOISE * np.abs(scale).min():
-        return ""
-    if size.max() > 8 * np.sqrt(np.mean(size**2)):
-        return ""
-    size_of = f"noise of standard deviation {evidence.noise:.2g} (absolute) in the entries"
-    return f"{size_of} would leave as much" if len(size) < _MANY else f"the misfit looks like {size_of}"
-
-
-def _turned_over(topology: Topology, certificate: Certificate) -> str:
-    triangles = np.concatenate([piece.vertices[piece.triangles] for piece in topology.pieces])
-    which = count_of(len(certificate.flipped), "triangle is", "triangles are")
-    return f"{which} flat or turned over, the first that of rows {words_of(np.sort(triangles[certificate.flipped[0]]))}"
-
-
-def with_noise(f: Findings, test: NoiseTest) -> Reason:
-    """What a test against known noise says."""
-    certificate = f.certificate
-    if test.drowned:
-        return Reason.of(
-            f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
-            f"{test.limit:.2g}, {LARGEST_NOISE:g} times the scale",
-            advice="give less noise, if the entries are that good",
-        )
-    if len(certificate.flipped):
-        return Reason.of(_turned_over(f.solved.topology, certificate), *astray(f), advice=_CHECK_MODEL)
-    if f.evidence.term:
-        return lacking(f, f.evidence.term)
-    if not test.likely:
-        return Reason.of(
-            _culprits(f.evidence), unlikely(test, certificate), *astray(f), advice="check the noise, and the entries"
-        )
-    chance = ", but there are too few different entries beyond the unknowns to tell that from chance"
-    return Reason.of(
-        f"{test.noise} explains the misfit {_figures(test)}" + (chance if test.coincidence else ""),
-        advice="write the entries with more digits" if test.coincidence else "",
-    )
-
-
-def astray(f: Findings) -> list[str]:
-    """Sentences on a mesh that is not the one of known noise: where the polish has ended."""
+def _astray(f: Findings) -> str:
+    """On a mesh that is not the one of known noise: where the polish has ended."""
     if len(f.evidence.suspects):
-        return f.trouble
+        return ""
     if not f.polished:
-        return ["the mesh was not polished", *f.trouble]
-    return [
-        "the polish has not come to a mesh that explains the matrix, and whether that is because of the start, "
-        "wrong entries or wrong cells cannot be told",
-        *f.trouble,
-    ]
+        return "the mesh was not polished"
+    why = "whether that is because of the start, wrong entries or wrong cells cannot be told"
+    return f"the polish has not come to a mesh that explains the matrix, and {why}"
 
 
-def unlikely(test: NoiseTest, certificate: Certificate) -> str:
+def _unlikely(f: Findings, test: NoiseTest) -> str:
     """That noise would not leave such a misfit."""
     if test.figures["p_value"] < CONFIDENCE:
-        return f"the misfit is more than {test.noise} explains {_figures(test)}"
-    i, j = certificate.pairs[test.worst]
+        return f"the misfit is more than {test.noise} explains {test}"
+    i, j = f.certificate.pairs[test.worst]
     return (
         f"the entry of rows {i} and {j} is off by {test.figures['largest']:.1f} standard deviations of {test.noise}, "
-        f"more than the largest of {len(certificate.pairs)} would be"
+        f"more than the largest of {len(f.certificate.pairs)} would be"
     )
-
-
-def _figures(test: NoiseTest) -> str:
-    statistic, freedom, p_value = (test.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value"))
-    return f"(chi-square {statistic:.4g} with {freedom:.4g} degrees of freedom, p = {p_value:.3g})"
 
 
 def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
@@ -184,16 +171,38 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
     )
 
 
-def nothing_to_spare(certificate: Certificate, rows: NDArray[np.int64], *, known_scale: bool) -> Reason:
-    """The reason of a mesh with pieces of as many unknowns as equations, by a row of each."""
-    which = (
-        f"the piece of row {rows[0]} has" if len(rows) == 1 else f"{len(rows)} pieces, as that of row {rows[0]}, have"
-    )
-    return Reason.of(
-        f"{which} no entry to spare: nearly any entries belong to such a mesh, and that it gives the matrix back to "
-        f"{certificate.backward_error:.1e} (relative) proves nothing",
-        advice="" if known_scale else "give `scale` if it is known",
-    )
+def _discord(solved: Solved, backward_error: float) -> str:
+    """What is wrong where pieces share vertices but not c, errors of entries allowed for; empty if nothing is.
+
+    Each piece by itself has its own c, and errors move it. Where the noise is known the others have been fitted with
+    the c of their leaders, if at all.
+    """
+    topology, noise, c = solved.topology, solved.noise, solved.scales
+    if not len(topology.hinges):
+        return ""
+    lead = leaders(topology, solved.spare)
+    difference = np.abs(c / c[lead] - 1)
+    # A null vector that is not polished may be off by more than the entries; noise says itself how much it explains.
+    if difference.max() > max(ALIKE, 0.0 if noise else MAGNIFIED * backward_error):
+        worst = int(difference.argmax())
+        named = " and ".join(
+            f"{c[p]:.6g} in piece {p}, of row {topology.pieces[p].vertices.min()}" for p in (int(lead[worst]), worst)
+        )
+        return f"pieces that share vertices have different factors c: {named}"
+    if noise is None:
+        return ""
+    # A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only
+    # be read in itself, and no other way if nothing has vanished and no triangle, with others all around, is a hole.
+    gone = np.zeros(len(topology.edges), dtype=bool)
+    gone[topology.vanished] = True
+    shared = np.array([np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces])
+    otherwise = np.array([gone[p.edge_rows].any() or p.inner[p.opposite].all(axis=1).any() for p in topology.pieces])
+    spare = solved.spare > 0
+    rough = (shared > 0) & (~spare[lead] | ((otherwise | (shared > 1)) & ~spare))
+    if not rough.any():
+        return ""
+    row = topology.pieces[int(rough.argmax())].vertices.min()
+    return f"the piece of row {row}, which shares vertices with others, has too few entries to tell under {noise}"
 
 
 def far_away(origins: NDArray, written: Certificate, near: Certificate) -> Reason:

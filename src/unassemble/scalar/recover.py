@@ -1,5 +1,6 @@
-"""A scalar matrix on one page: recognise, solve, place, certify."""
+"""A scalar matrix of linear triangles: recognise, solve, place; and what comes after that, for any element."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -8,13 +9,13 @@ from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative, alternatives
 from ..certify import certify
+from ..certify_spare import without_spare_equations
 from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.cotangent import edge_weights
 from ..planar.deviations import covariances
-from ..planar.normal import WeightJacobian, distant_pair
+from ..planar.normal import distant_pair
 from ..recovery import PlanarMesh
 from ..tolerances import SIGMAS
 from ..topology import Polygons
@@ -26,7 +27,7 @@ from .noise import Noise
 from .notes import vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
-from .verdict import Findings, Verdict, verdict
+from .verdict import Drawn, Findings, verdict
 
 
 def recover_scalar(
@@ -41,66 +42,136 @@ def recover_scalar(
     `squared_lengths` (e,): of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
     task = Task(options, placement, Noise.known(stored, options.noise))
-    free_scale = task.scale is None
     with clock("topology"):
         topology = stored.surfaces
     if task.noise is not None:
         stored = replace(stored, errors=task.noise.sigma * task.noise.spread)
-    solved = solve(topology, stored, clock, task)
+    solved, sizes = solve(topology, stored, clock, task), None
     topology = solved.topology
+    if squared_lengths is not None:  # mean edge length of each piece; over all edges 1
+        lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
+        sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
+
+    given, tensor = (stored.edges, stored.entries), placement.coefficients
+
+    def drawn(placed: list[NDArray]) -> Drawn:
+        mesh = JoinedMesh.of(topology, placed, solved.scales / placement.stretch)
+        triangles, factors = mesh.triangles, mesh.scale[mesh.triangle_piece]
+        return Drawn(
+            mesh.points,
+            [triangles],
+            lambda points: certify(*given, points, {"triangle": triangles}, {"triangle": factors}, tensor=tensor),
+            lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=task.scale is not None),
+            partial(_other_meshes, mesh, clock, task),
+            PlanarMesh,
+            mesh.fields(triangulate=options.triangulate) | {"n_holes": topology.n_holes},
+        )
+
+    return finished(solved, drawn, (*vanished_notes(topology), *topology.failures), clock, task, sizes)
+
+
+def finished(
+    solved: Solved,
+    drawn: Callable[[list[NDArray]], Drawn],
+    notes: Sequence[str],
+    clock: Clock,
+    task: Task,
+    sizes: NDArray[np.float64] | None = None,
+) -> PlanarMesh:
+    """From positions of pieces of any element to the answer: place, certificate, evidence, error bars and verdict.
+
+    `drawn`: pieces at positions, (k,) each, as a mesh; `notes`: what is to be said of it; `sizes` (pieces,): of pieces
+    whose size nothing else tells.
+    """
+    topology, placement, options, free_scale = solved.topology, task.placement, task.options, task.scale is None
     with clock("place"):
-        sizes = None
-        if squared_lengths is not None:  # mean edge length of each piece; over all edges 1
-            lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
-            sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
-        z, remarks = [mesh.z for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
-        placed, origins, notes = task.placement.placed(topology, z, remarks, sizes)
-        mesh = JoinedMesh.of(topology, placed, solved.scales / task.placement.stretch)
+        nodes, remarks = [mesh.nodes for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
+        placed, origins, said = placement.placed(topology, nodes, remarks, sizes)
+        mesh = drawn(placed)
+        shift = origins[topology.component]
+        written = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        near = _held_against(stored, solved, mesh, mesh.points, task)
+        near = far = _held(solved, mesh, mesh.points, free_scale=free_scale)
+        if origins.any():
+            far = _held(solved, mesh, written, free_scale=free_scale)
         evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
     deviations = None
-    if task.options.standard_deviations:
+    if options.standard_deviations:
         with clock("deviations"):
             deviations = _deviations(solved, task, placed)
-    written = _held_against(stored, solved, mesh, mesh.shifted(origins), task) if origins.any() else near
-    findings = Findings(stored, solved, mesh, origins, near, written, evidence, not free_scale, task.options.polished)
-    notes = [*solved.matrix.warnings, *notes, *vanished_notes(topology), *topology.failures]
-    return _report(
-        findings, verdict(findings, partial(_other_meshes, findings, clock, task)), notes, deviations, clock, task
+    status, uniqueness, reason, others = verdict(
+        Findings(solved, mesh, origins, near, far, evidence, not free_scale, options.polished)
     )
+    notes = [*solved.stored.warnings, *said, *notes]
+    if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
+        notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
+    if uniqueness == "searched" and not small(solved.stored):
+        notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
+    refused = status == "uncertified" and uniqueness is None
+    return mesh.kind(
+        **mesh.fields,
+        **far.fields(10 if refused else 0, evidence.suspects),
+        points=written,
+        hinges=topology.hinges,
+        node_status=(topology.multiplicity == 0).astype(np.int8),
+        status=status,
+        uniqueness=uniqueness,
+        reason=reason.text,
+        advice=reason.advice,
+        operator=placement.operator,
+        timings=clock.timings,
+        warnings=tuple(notes),
+        standard_deviations=deviations,
+        estimated_noise=evidence.noise,
+        missing_term=evidence.term.name if evidence.term else "",
+        suspects=evidence.suspects,
+        alternatives=tuple(others),
+    )
+
+
+def small(stored: OperatorMatrix) -> bool:
+    """Whether other meshes are looked for in all of a matrix."""
+    return bool(np.bincount(connected(stored.n, *stored.edges.T)[1]).max() <= SEARCHED_ROWS)
+
+
+def _held(solved: Solved, mesh: Drawn, points: NDArray, *, free_scale: bool) -> Held:
+    """The certificate of a mesh with these points, and the test against noise."""
+    freedom = solved.freedom(free_scale=free_scale)
+    return Held.of(mesh.held(points), solved.stored, solved.noise, freedom, solved.scales)
 
 
 def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     """(n, 2) standard deviations in the final frame, in which pieces are `placed`, (k,) each."""
-    pieces, meshes, tensor = solved.topology.pieces, solved.meshes, task.placement.tensor
-    free = task.scale is None
+    pieces, tensor, free = solved.topology.pieces, task.placement.tensor, task.scale is None
     sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
     result = np.full((solved.topology.n_vertices, 2), np.nan)
     for p in range(len(pieces))[::-1]:  # the first piece at a hinge comes last
-        z = tensor.to_laplacian(placed[p]) if tensor else placed[p]
-        jacobian, stretch = WeightJacobian(pieces[p], z, meshes[p].spread), tensor.root if tensor else None
-        weights = edge_weights(pieces[p], z) / jacobian.spread
-        covariance = covariances(jacobian, weights, z, distant_pair(z), free_scale=free, stretch=stretch)
-        own = sigma / abs(meshes[p].scale)
+        model, mesh = solved.models[p], solved.meshes[p]
+        nodes = tensor.to_laplacian(placed[p]) if tensor else placed[p]
+        z = nodes[: model.n]
+        weights = model.weights(z)
+        spread = np.ones(len(weights)) if mesh.spread is None else mesh.spread
+        covariance = covariances(
+            model.jacobian(z, spread),
+            weights / spread,
+            nodes,
+            distant_pair(z),
+            free_scale=free,
+            stretch=tensor.root if tensor else None,
+            nodes=model.nodes,
+        )
+        own = sigma / abs(mesh.scale)
         result[pieces[p].vertices] = own * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
 
 
-def _held_against(stored: OperatorMatrix, solved: Solved, mesh: JoinedMesh, points: NDArray, task: Task) -> Held:
-    """The certificate of a mesh with these points, and the test against noise."""
-    noise, factors, tensor = solved.noise, mesh.scale[mesh.triangle_piece], task.placement.coefficients
-    certificate = certify(stored.edges, stored.entries, points, mesh.triangles, factors, tensor)
-    return Held.of(certificate, stored, noise, solved.freedom(free_scale=task.scale is None), solved.scales)
-
-
-def _other_meshes(findings: Findings, clock: Clock, task: Task) -> tuple[list[Alternative], str]:
+def _other_meshes(mesh: JoinedMesh, clock: Clock, task: Task, findings: Findings) -> tuple[list[Alternative], str]:
     """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
 
     Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
     zeros show it no better than those that are not.
     """
-    solved, stored, mesh, noise = findings.solved, findings.stored, findings.mesh, findings.solved.noise
+    solved, stored, noise = findings.solved, findings.solved.stored, findings.solved.noise
     shown = solved.topology.method == "3-cycles"
     zero = stored.entries == 0
     if shown and not zero.any():
@@ -116,37 +187,3 @@ def _other_meshes(findings: Findings, clock: Clock, task: Task) -> tuple[list[Al
     with clock("ambiguity"), blas_threads(1):  # many small problems
         others = alternatives(given.without(zero), cells, z, task.scale, agree)
     return others, "ambiguous" if others else "proved" if shown else "searched"
-
-
-def _report(
-    findings: Findings, found: Verdict, notes: list[str], deviations: NDArray | None, clock: Clock, task: Task
-) -> PlanarMesh:
-    """Everything under the names that callers know."""
-    solved, evidence, mesh, held = findings.solved, findings.evidence, findings.mesh, findings.written
-    topology, options = solved.topology, task.options
-    refused = found.status == "uncertified" and found.uniqueness is None
-    if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
-        notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    component = connected(findings.stored.n, *findings.stored.edges.T)[1]
-    if found.uniqueness == "searched" and np.bincount(component).max() > SEARCHED_ROWS:
-        notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
-    return PlanarMesh(
-        **mesh.fields(triangulate=options.triangulate),
-        **held.fields(10 if refused else 0, evidence.suspects),
-        points=mesh.shifted(findings.origins),
-        hinges=topology.hinges,
-        node_status=(topology.multiplicity == 0).astype(np.int8),
-        status=found.status,
-        uniqueness=found.uniqueness,
-        reason=found.reason.text,
-        advice=found.reason.advice,
-        operator=task.placement.operator,
-        n_holes=topology.n_holes,
-        timings=clock.timings,
-        warnings=tuple(notes),
-        standard_deviations=deviations,
-        estimated_noise=evidence.noise,
-        missing_term=evidence.term.name if evidence.term else "",
-        suspects=evidence.suspects,
-        alternatives=tuple(found.others),
-    )

@@ -1,5 +1,6 @@
 """Every piece from its entries to positions; pieces that fail do not stop the others."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,6 +16,7 @@ from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.hinges import groups
 from ..planar.piece import PieceMesh, collapsed, left_by_all, positions, refined
+from ..planar.polish import Model, PolishOptions, model_of
 from ..tolerances import NOISY
 from ..topology import Piece, Topology
 from ..words import sentences
@@ -40,11 +42,20 @@ class Task:
 class Solved:
     """Positions and scale of each piece, in no particular frame."""
 
+    stored: OperatorMatrix  # as given
     matrix: OperatorMatrix  # with entries that had vanished as zeros
     # of that matrix, without the pieces that have no positions; these are listed in its ``failures``
     topology: Topology
-    meshes: list[PieceMesh]
+    meshes: Sequence[PieceMesh]
+    models: Sequence[Model]  # their weights as functions of positions
+    spare: NDArray[np.int64]  # (pieces,) entries of each less unknowns, c among these
     noise: Noise | None  # without that of rounding, if the misfit is far beyond it
+
+    @property
+    def fits(self) -> Iterator[tuple[NDArray, Model, PieceMesh]]:
+        """Of each piece its weights, -A_ij, as given, and as functions of positions, and the mesh."""
+        weights = [-self.matrix.entries[piece.edge_rows] for piece in self.topology.pieces]
+        return zip(weights, self.models, self.meshes, strict=True)
 
     @property
     def scales(self) -> NDArray[np.float64]:
@@ -52,32 +63,31 @@ class Solved:
         return np.array([mesh.scale for mesh in self.meshes])
 
     def freedom(self, *, free_scale: bool) -> int:
-        """Entries less unknowns: 2 v - 4 coordinates of each piece, and each c that was fitted."""
-        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces)
-        lead = leaders(self.topology)
+        """Entries less unknowns: coordinates of each piece, and each c that was fitted."""
+        lead = leaders(self.topology, self.spare)
         fitted = int(np.sum((lead == np.arange(len(lead))) | (self.scales != self.scales[lead])))
-        return len(self.topology.edges) - coordinates - (fitted if free_scale else 0)
+        return int(self.spare.sum()) + len(lead) - (fitted if free_scale else 0)
 
 
-def leaders(topology: Topology) -> NDArray[np.int64]:
+def leaders(topology: Topology, spare: NDArray[np.int64]) -> NDArray[np.int64]:
     """(pieces,) of those that hang together by vertices the one that tells c best, with the most entries to spare."""
     n = len(topology.pieces)
     if not len(topology.hinges):
         return np.arange(n)
     group = groups(topology)
-    spare = np.array([piece.redundancy for piece in topology.pieces])
     order = np.lexsort((-np.arange(n), spare, group))
     return np.asarray(order[np.searchsorted(group[order], group, side="right") - 1])
 
 
 def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) -> Solved:
     """Positions and scale of each piece; raises RecoveryError if no piece has any."""
-    method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
+    stored, method, refine, scale, noise = matrix, task.options.method, task.options.polished, task.scale, task.noise
 
     @cache
     def start(piece: Piece) -> Outcome:
+        sharp = not refine or piece.n_vertices > PolishOptions().most_vertices
         try:
-            return _start(piece, -matrix.entries[piece.edge_rows], method, scale, sharp=not refine)
+            return _start(piece, -matrix.entries[piece.edge_rows], method, scale, sharp=sharp)
         except (GeometryError, SolverError) as error:
             return error
 
@@ -108,7 +118,11 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
             for why, mesh in zip(whys, meshes, strict=True)
         ]
         topology, meshes = _successes(topology, sound)
-    return Solved(matrix, topology, meshes, noise)
+    return Solved(stored, matrix, topology, meshes, list(map(model_of, topology.pieces)), _spare(topology), noise)
+
+
+def _spare(topology: Topology) -> NDArray[np.int64]:
+    return np.array([piece.redundancy for piece in topology.pieces])
 
 
 def _polished(
@@ -122,7 +136,7 @@ def _polished(
         weights, own = -matrix.entries[piece.edge_rows], errors[piece.edge_rows]
         return refined(piece, weights, meshes[p], scale=scale, rounding=noise is None, noise=own)
 
-    lead = leaders(topology) if noise else np.arange(len(meshes))
+    lead = leaders(topology, _spare(topology)) if noise else np.arange(len(meshes))
     first = {p: polished(p, scale) for p in np.unique(lead).tolist()}
     return [first.get(p) or polished(p, scale or first[int(lead[p])].scale) for p in range(len(meshes))]
 
