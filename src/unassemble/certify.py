@@ -3,14 +3,20 @@
 Knows nothing of how the mesh was found, and imports no solver.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtr
 
+from .budget import AT_ONCE
+from .certify_elements import corners_of, functions, masses, rule_of
 from .tolerances import CERTIFIED
+
+_CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +25,7 @@ class Terms:
 
     diagonal: NDArray[np.float64]  # (n,) A_ii of the matrix
     reaction: float = 0.0  # s
-    lumped: bool = False  # whether M is diagonal: a third of its area from each triangle to each of its corners
+    lumped: bool = False  # whether M is diagonal: the sums of the consistent one's rows
     scaling: NDArray[np.float64] | None = None  # (n,) S; the identity by default
 
 
@@ -34,7 +40,7 @@ class Certificate:
     pairs: NDArray[np.int64]
     misfits: NDArray[np.float64]  # (k,) their differences, relative in the same way
     differences: NDArray[np.float64]  # (k,) re-assembled minus given
-    flipped: NDArray[np.int64]  # (f,) triangles that are flat or turned over: with any of them a mesh is not planar
+    flipped: NDArray[np.int64]  # (f,) cells that are flat or turned over: with any of them a mesh is not planar
 
     def worst(
         self, count: int = 10, *, noise: NDArray | None = None, first: NDArray | None = None
@@ -59,40 +65,54 @@ def certify(
     edges: NDArray,
     entries: NDArray,
     points: NDArray,
-    triangles: NDArray,
-    factor: NDArray,
+    blocks: Mapping[str, NDArray],
+    factors: Mapping[str, NDArray],
+    *,
+    rules: Mapping[str, str] = MappingProxyType({"triangle": "degree 1"}),
     tensor: tuple[float, float, float] | None = None,
     terms: Terms | None = None,
 ) -> Certificate:
-    """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries; with further terms all.
+    """Re-assemble factor * div(K grad) with isoparametric elements and compare off-diagonal entries.
 
-    `edges` (e, 2): pairs i < j of the matrix; `entries` (e,): A_ij; `points` (n, 2); `triangles` (m, 3); `factor` (m,):
-    the factor c of each triangle's piece; `tensor`: kxx, kxy and kyy of K, the identity by default; `terms`: what the
-    matrix has besides, where it has.
+    With further terms the diagonal as well. `edges` (e, 2): pairs i < j of the matrix; `entries` (e,): A_ij; `points`
+    (n, 2); `blocks`: cells (m, k) by meshio's names and in its order; `factors` (m,) of each: the c of each cell's
+    piece; `rules`: quadrature of each, see :func:`.certify_elements.rule_of`; `tensor`: kxx, kxy and kyy of K, the
+    identity by default. Cells are flipped that are not right side out in each corner and at each point of the
+    quadrature; they count through all kinds.
     """
-    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
-    corners = [np.ascontiguousarray(column) for column in triangles.T]
-    at = [points[corner] for corner in corners]
-    (ux, uy), (wx, wy) = (at[1] - at[0]).T, (at[2] - at[0]).T
-    flipped = np.flatnonzero(~(ux * wy - uy * wx > 0))
-    # With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the turned tensor is the
-    # adjugate of K: the entry is s_i' adj(K) s_j / (4 area), areas taken positive.
-    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
-    ends, values = [], []
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
-        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
-        weight = factor / (2 * double)
-        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
-            (xi, yi), (xj, yj) = sides[i], sides[j]
-            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
-            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            value = weight * product
-            if terms is not None:  # int s phi_i phi_j is s area (1 + delta_ij) / 12
-                part = (6 if i == j else np.inf) if terms.lumped else (12 if i == j else 24)
-                value = value + terms.reaction / part * double
-            values.append(value)
-    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
-    return compared(len(points), edges, entries, (rows, columns), np.concatenate(values), flipped, terms)
+    (kxx, kxy, kyy), n = tensor or (1.0, 0.0, 1.0), len(points)
+    keys, values, flipped, first = [], [], [], 0
+    for name, cells in blocks.items():
+        at, weights = rule_of(rules[name])
+        _, phi_s, phi_t = functions(name, at)
+        _, corner_s, corner_t = functions(name, corners_of(name))
+        a, b = np.triu_indices(cells.shape[1], 1 if terms is None else 0)
+        for start in range(0, len(cells), _CELLS):
+            some = cells[start : start + _CELLS]
+            x, y = (points[some] - points[some[:, :1]]).transpose(2, 0, 1)  # digits of differences, not of coordinates
+            xs, ys, xt, yt = x @ phi_s.T, y @ phi_s.T, x @ phi_t.T, y @ phi_t.T
+            determinant = xs * yt - xt * ys
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat cell certifies nothing
+                scaled = weights / np.abs(determinant)
+                ss = scaled * (kxx * yt**2 - 2 * kxy * xt * yt + kyy * xt**2)
+                st = scaled * (kxx * ys * yt - kxy * (xs * yt + xt * ys) + kyy * xs * xt)
+                tt = scaled * (kxx * ys**2 - 2 * kxy * xs * ys + kyy * xs**2)
+                value = (
+                    ss @ (phi_s[:, a] * phi_s[:, b])
+                    - st @ (phi_s[:, a] * phi_t[:, b] + phi_t[:, a] * phi_s[:, b])
+                    + tt @ (phi_t[:, a] * phi_t[:, b])
+                )
+            at_corner = (x @ corner_s.T) * (y @ corner_t.T) - (x @ corner_t.T) * (y @ corner_s.T)
+            right = (determinant > 0).all(axis=1) & (at_corner > 0).all(axis=1)
+            flipped.append(first + start + np.flatnonzero(~right))
+            keys.append((np.minimum(some[:, a], some[:, b]) * n + np.maximum(some[:, a], some[:, b])).ravel())
+            value = value * factors[name][start : start + _CELLS, None]
+            if terms is not None and terms.reaction:
+                value += terms.reaction * masses(name, x, y, lumped=terms.lumped)
+            values.append(value.ravel())
+        first += len(cells)
+    places = np.divmod(np.concatenate(keys), n)
+    return compared(n, edges, entries, places, np.concatenate(values), np.concatenate(flipped), terms)
 
 
 def compared(

@@ -1,22 +1,13 @@
-"""The certificate of meshes of any planar element: shape functions, quadrature and assembly of its own.
-
-Knows nothing of how the mesh was found, and imports no solver.
-"""
-
-from collections.abc import Mapping
+"""Planar elements as the certificate has them: shape functions and quadrature of its own."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
-from .budget import AT_ONCE
-from .certify import Certificate, Terms, compared
-
-_CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
-
 # Orbits (weight, repeated barycentric coordinate), weights adding up to 1 over all points: Dunavant, "High degree
 # efficient symmetrical Gaussian quadrature rules for the triangle", IJNME 21, 1985.
 _TRIANGLE_RULES: dict[str, tuple[tuple[float, float], ...]] = {
+    "degree 1": ((1.0, 1 / 3),),
     "degree 2": ((1 / 3, 1 / 6),),
     "degree 4": (
         (0.22338158967801146569500700843312, 0.44594849091596488631832925388305),
@@ -35,65 +26,15 @@ _CORNERS = {
 }
 
 
-def certify_elements(
-    edges: NDArray,
-    entries: NDArray,
-    points: NDArray,
-    blocks: Mapping[str, NDArray],
-    factors: Mapping[str, NDArray],
-    rules: Mapping[str, str],
-    terms: Terms | None = None,
-) -> Certificate:
-    """Re-assemble factor * Laplacian with isoparametric elements and compare off-diagonal entries.
-
-    With further terms, which are not lumped, the diagonal as well. `edges` (e, 2): pairs i < j of the matrix; `entries`
-    (e,): A_ij; `points` (n, 2); `blocks`: cells (m, k) by meshio's names and in its order; `factors` (m,) of each: the
-    c of each cell's piece; `rules`: quadrature, ``"n x n Gauss"`` for quadrilaterals, ``"degree 2"``, ``"degree 4"`` or
-    ``"degree 5"`` for triangles. Cells are flipped that are not right side out in each corner and at each point of the
-    quadrature; they count through all kinds.
-    """
-    n = len(points)
-    keys, values, flipped, first = [], [], [], 0
-    for name, cells in blocks.items():
-        base = "triangle" if name.startswith("triangle") else "quad"
-        at, weights = _triangle_rule(rules[name]) if base == "triangle" else _gauss_rule(int(rules[name].split()[0]))
-        _, phi_s, phi_t = _functions(name, at)
-        _, corner_s, corner_t = _functions(name, _CORNERS[base])
-        a, b = np.triu_indices(cells.shape[1], 1 if terms is None else 0)
-        for start in range(0, len(cells), _CELLS):
-            some = cells[start : start + _CELLS]
-            x, y = (points[some] - points[some[:, :1]]).transpose(2, 0, 1)  # digits of differences, not of coordinates
-            xs, ys, xt, yt = x @ phi_s.T, y @ phi_s.T, x @ phi_t.T, y @ phi_t.T
-            determinant = xs * yt - xt * ys
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat cell certifies nothing
-                scaled = weights / np.abs(determinant)
-                ss, st, tt = scaled * (xt**2 + yt**2), scaled * (xs * xt + ys * yt), scaled * (xs**2 + ys**2)
-                value = (
-                    ss @ (phi_s[:, a] * phi_s[:, b])
-                    - st @ (phi_s[:, a] * phi_t[:, b] + phi_t[:, a] * phi_s[:, b])
-                    + tt @ (phi_t[:, a] * phi_t[:, b])
-                )
-            at_corner = (x @ corner_s.T) * (y @ corner_t.T) - (x @ corner_t.T) * (y @ corner_s.T)
-            right = (determinant > 0).all(axis=1) & (at_corner > 0).all(axis=1)
-            flipped.append(first + start + np.flatnonzero(~right))
-            keys.append((np.minimum(some[:, a], some[:, b]) * n + np.maximum(some[:, a], some[:, b])).ravel())
-            value = value * factors[name][start : start + _CELLS, None]
-            if terms is not None and terms.reaction:
-                value += terms.reaction * _masses(name, x, y)
-            values.append(value.ravel())
-        first += len(cells)
-    places, flipped_cells = np.divmod(np.concatenate(keys), n), np.concatenate(flipped)
-    return compared(n, edges, entries, places, np.concatenate(values), flipped_cells, terms)
+def corners_of(name: str) -> NDArray[np.float64]:
+    """(3 or 4, 2) corners of the reference cell."""
+    return _CORNERS[name.rstrip("0123456789")]
 
 
-def _gauss_rule(order: int) -> tuple[NDArray, NDArray]:
-    """Points (q, 2) of the square from -1 to 1, and weights."""
-    x, w = roots_legendre(order)
-    return np.array([(s, t) for s in x for t in x]), np.outer(w, w).ravel()
-
-
-def _triangle_rule(name: str) -> tuple[NDArray, NDArray]:
-    """Points (q, 2) of the unit triangle, and weights."""
+def rule_of(name: str) -> tuple[NDArray, NDArray]:
+    """Points (q, 2) and weights: ``"n x n Gauss"`` for quadrilaterals, ``"degree 1"``, 2, 4 or 5 for triangles."""
+    if name.endswith("Gauss"):
+        return _gauss_rule(int(name.split()[0]))
     points, weights = [], []
     for weight, r in _TRIANGLE_RULES[name]:
         orbit = {(r, r), (r, 1 - 2 * r), (1 - 2 * r, r)} if abs(r - 1 / 3) > 1e-9 else {(r, r)}
@@ -102,8 +43,16 @@ def _triangle_rule(name: str) -> tuple[NDArray, NDArray]:
     return np.array(points), np.array(weights)
 
 
-def _masses(name: str, x: NDArray, y: NDArray) -> NDArray:
+def _gauss_rule(order: int) -> tuple[NDArray, NDArray]:
+    """Points (q, 2) of the square from -1 to 1, and weights."""
+    x, w = roots_legendre(order)
+    return np.array([(s, t) for s in x for t in x]), np.outer(w, w).ravel()
+
+
+def masses(name: str, x: NDArray, y: NDArray, *, lumped: bool) -> NDArray:
     """(m, pairs) integrals of products of shape functions, a node's with itself among them, exact in the plane.
+
+    With `lumped` masses a node has the integral of its own, and pairs have nothing.
 
     By Gauss's points on a square, on triangles folded: (s, t) -> (s, (1 - s) t) on the unit square.
     """
@@ -111,20 +60,21 @@ def _masses(name: str, x: NDArray, y: NDArray) -> NDArray:
     if name.startswith("triangle"):
         s, t = (at.T + 1) / 2
         at, weight = np.column_stack([s, (1 - s) * t]), weight / 4 * (1 - s)
-    value, along_s, along_t = _functions(name, at)
+    value, along_s, along_t = functions(name, at)
     a, b = np.triu_indices(value.shape[1])
     determinant = (x @ along_s.T) * (y @ along_t.T) - (x @ along_t.T) * (y @ along_s.T)
-    return (np.abs(determinant) * weight) @ (value[:, a] * value[:, b])
+    products = np.where(a == b, value[:, a], 0.0) if lumped else value[:, a] * value[:, b]
+    return (np.abs(determinant) * weight) @ products
 
 
-def _functions(name: str, at: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def functions(name: str, at: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """(q, k) shape functions at points (q, 2) of the reference cell, and their derivatives along both coordinates.
 
     Polynomials that are one in their own node and zero in the others. Triangles have all monomials up to a degree,
     quadrilaterals all up to that degree in each direction, but for the highest one where no node is inside.
     """
     inside = {"triangle6": [1 / 2], "triangle10": [1 / 3, 2 / 3], "quad8": [1 / 2], "quad9": [1 / 2]}.get(name, [])
-    corner = _CORNERS[name.rstrip("0123456789")]
+    corner = corners_of(name)
     side = [(1 - x) * p + x * q for p, q in zip(corner, np.roll(corner, -1, axis=0), strict=True) for x in inside]
     centre = [corner.mean(axis=0)] if name in ("triangle10", "quad9") else []
     nodes, degree = np.array([*corner, *side, *centre]), len(inside) + 1

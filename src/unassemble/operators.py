@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from .nodes.unknowns import (
     find_numbering,
     given_numbering,
     nodes_of_pattern,
-    numbering_at_sight,
     regular_numbering,
 )
 from .structures import StructuralNumbering, find_structure, given_structure, truss_numbering
@@ -102,7 +102,9 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
         return VectorReading(beam, "its rows form one line of nodes, whose blocks are those of members that bend")
     if matrix.n < 3 or len(matrix.edges) <= 3 * matrix.n - 6:
         return None
-    return _by_nodes(matrix, numbering_at_sight, "the graph has more edges than a planar one can have")
+    return _by_nodes(
+        matrix, partial(find_numbering, at_sight=True), "the graph has more edges than a planar one can have"
+    )
 
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
@@ -114,9 +116,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     return _by_nodes(matrix, find_numbering, "it is no planar mesh")
 
 
-def _by_nodes(
-    matrix: OperatorMatrix, find: Callable[[sp.csr_array], Numbering | None], because: str
-) -> VectorReading | None:
+def _by_nodes(matrix: OperatorMatrix, find: Callable[[sp.csr_array], Numbering], because: str) -> VectorReading | None:
     """A structure; or nodes whose rows annihilate constants, as those of scalar matrices never do; or a truss."""
     whole, rounding = _exact(matrix)
     found: Numbering | StructuralNumbering | None = find_structure(whole)

@@ -142,7 +142,7 @@ class ScalarReadings:
         return recover_regions(matrix, every, self.placement, self.clock, self.options, self._exchanges)
 
     def _linear(self) -> PlanarMesh:
-        return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.tensor)
+        return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)
 
     def _plain(self, matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
         return recover_scalar(matrix, self.placement, self.clock, self.options, squared_lengths)

@@ -56,7 +56,7 @@ def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:
     direction = numbering.direction_of_row
     if numbering.unnamed is not None:
         direction = np.where(numbering.unnamed, -1, direction)
-    same = StructuralNumbering(PINNED, numbering.node_of_row, direction, numbering.kind, numbering.share)
+    same = StructuralNumbering(numbering.node_of_row, direction, numbering.kind, numbering.share, PINNED)
     try:
         found = serve_structure(same, request)
     except RecoveryError:

@@ -24,7 +24,7 @@ def fields_of_a_body(value):
 @pytest.mark.parametrize(("value", "loose"), [(1e-16, LOOSE), (SOFT / 3, LOOSE), (10 * SOFT, 0)])
 def test_what_moves_almost_freely_is_loose(value, loose):
     points, fields, values = fields_of_a_body(value)
-    found = shape(fields, values, np.ones(N, dtype=bool))
+    found = shape(fields, values, np.ones(N, dtype=bool), N)
     moving = np.isnan(found.points).any(axis=1)
     assert np.count_nonzero(moving) == loose
     assert moving[:loose].all()

@@ -211,20 +211,25 @@ def test_certificate_sees_every_kind_of_error():
     edges = edge_list(known.triangles)
     entries = np.asarray(known.matrix[edges[:, 0], edges[:, 1]]).ravel()
     factor = np.full(len(known.triangles), -4.0)
-    given = (edges, entries, known.points, known.triangles, factor, (2.0, 0.3, 1.0))
-    assert certify(*given).backward_error < 1e-13
+    factors, tensor, cells = {"triangle": factor}, (2.0, 0.3, 1.0), {"triangle": known.triangles}
+
+    def error(edges, entries, points, cells, factors=factors):
+        return certify(edges, entries, points, cells, factors, tensor=tensor).backward_error
+
+    assert error(edges, entries, known.points, cells) < 1e-13
     flipped = known.triangles[:, [0, 2, 1]]
-    assert certify(edges, entries, known.points, flipped, *given[4:]).backward_error < 1e-13
+    assert error(edges, entries, known.points, {"triangle": flipped}) < 1e-13
     moved = known.points.copy()
     moved[5] += 1e-6
-    assert 1e-8 < certify(edges, entries, moved, *given[3:]).backward_error < 1e-2
-    assert certify(edges[:-1], entries[:-1], *given[2:]).backward_error > 1e-3
-    assert certify(edges, entries, known.points, known.triangles[1:], factor[1:], (2.0, 0.3, 1.0)).backward_error > 1e-3
+    assert 1e-8 < error(edges, entries, moved, cells) < 1e-2
+    assert error(edges[:-1], entries[:-1], known.points, cells) > 1e-3
+    fewer = {"triangle": known.triangles[1:]}, {"triangle": factor[1:]}
+    assert error(edges, entries, known.points, *fewer) > 1e-3
     wrong = entries.copy()
     wrong[7] *= 1.001
-    certificate = certify(edges, wrong, *given[2:])
+    certificate = certify(edges, wrong, known.points, cells, factors, tensor=tensor)
     assert certificate.backward_error > 1e-6
     assert certificate.worst()[0][0].tolist() == edges[7].tolist()
     undone = known.points.copy()
     undone[3] = np.nan
-    assert certify(edges, entries, undone, *given[3:]).backward_error == np.inf
+    assert error(edges, entries, undone, cells) == np.inf

@@ -94,7 +94,7 @@ def _report(
         mesh = replace(mesh, points=mesh.points + np.column_stack([shift.real, shift.imag]))
     status = node_status(mesh.component, told)
     with clock("certify"):
-        found = held(matrix, mesh, placement.tensor)
+        found = held(matrix, mesh, placement.coefficients)
         pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))

@@ -5,8 +5,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
-from ..certify import Terms
-from ..certify_elements import certify_elements
+from ..certify import Terms, certify
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -125,10 +124,8 @@ def _backward_error(
     diagonal, size = np.zeros(len(z)), np.full(len(z), np.inf)
     diagonal[own], size[own] = matrix.diagonal[own] - lattice.added, matrix.row_size[own]
     name, shapes = ("quad", cells) if lattice.bilinear else ("triangle", _divided(cells))
-    found = certify_elements(
-        matrix.edges, matrix.entries, np.column_stack([z.real, z.imag]), {name: shapes},
-        {name: np.full(len(shapes), lattice.scale)}, _RULES, Terms(diagonal),
-    )  # fmt: skip
+    points, factors = np.column_stack([z.real, z.imag]), {name: np.full(len(shapes), lattice.scale)}
+    found = certify(matrix.edges, matrix.entries, points, {name: shapes}, factors, rules=_RULES, terms=Terms(diagonal))
     errors = np.abs(found.differences) / size[found.pairs].min(axis=1)
     return np.inf if len(found.flipped) else float(errors[(found.pairs < matrix.n).all(axis=1)].max())
 

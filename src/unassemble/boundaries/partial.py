@@ -148,7 +148,8 @@ def _report(
     mesh, topology, status = placed.mesh, placed.topology, placed.status
     with clock("certify"):
         points = np.nan_to_num(mesh.points)
-        found = certify(matrix.edges, matrix.entries, points, mesh.triangles, placed.factor, placement.coefficients)
+        on = {"triangle": mesh.triangles}, {"triangle": placed.factor}
+        found = certify(matrix.edges, matrix.entries, points, *on, tensor=placement.coefficients)
         rows, spare = [], []
         for piece, inside in zip(topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():

@@ -77,58 +77,36 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
     return np.asarray(loose[numbering.node_of_row] & (numbering.unnamed | ~whole[numbering.node_of_row]))
 
 
-def about_cells(found: Cells) -> Iterator[str]:
-    """What there is to say of the elements."""
-    if not found.recognised:
-        yield (
-            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, of "
-            "one kind throughout, or linear triangles beside quadrilaterals"
-        )
-    elif not found.certified:
-        yield (
-            "the elements were read off the graph and are not certified: no material was found with which they "
-            "re-assemble to the matrix"
-        )
-
-
-def about_nodes(
+def notes(
     nodal: NodalMatrix,
+    solution: Solution,
+    found: Cells | None,
     loose: NDArray[np.bool_],
-    withheld: NDArray[np.bool_],
-    hanging: NDArray[np.bool_],
-    lone: NDArray[np.bool_],
+    masks: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
+    guessed: int,
 ) -> Iterator[str]:
-    """Why nodes have no coordinates: `loose`.
+    """What there is to say of nodes without coordinates, `loose`, elements, if these were asked for, and assumptions.
 
-    No cell confirms those `withheld`; others rest on an assumption that nothing confirms, `hanging`, or on identities
-    that no others would contradict, `lone`.
+    The `masks`, (n,) each, are of nodes that no element confirms, that rest on an assumption, and that nothing checks.
+    So many rows of nodes without coordinates have `guessed` directions.
     """
+    withheld, hanging, lone = masks
     sprung = loose & (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
-    for some, said in (
+    other = loose & ~(withheld | hanging | lone | sprung)
+    for some, why in (
         (sprung, "on springs, or on nothing: no linear field knows a spring"),
-        (withheld, "no element shows that its rows are its own, and which rows make up a node was inferred"),
-        (hanging & ~withheld, "determined only if nodes that lack a direction lie in planes across it, which neither "
-         "another equation nor an element confirms"),
+        (withheld, "no element shows that the rows that were inferred to be its own are"),
+        (hanging & ~withheld, "determined only if nodes that lack a direction lie in planes across it"),
         (lone, "determined by identities that no others check, nor an element"),
-        (loose & ~withheld & ~hanging & ~lone & ~sprung, "rows coupled to it lack entries, as next to eliminated "
-         "unknowns, or belong to other axes, as at inclined supports, and no equation that holds for every element and "
-         "material is left of these"),
-    ):  # fmt: skip
+        (other, "no equation that holds for every element is left of rows that lack entries, or belong to other axes"),
+    ):
         if some.any():
-            yield f"no position for {count_of(int(some.sum()), 'node')}: {said}"
-
-
-def about_assumptions(solution: Solution, guessed: int) -> Iterator[str]:
-    """What was assumed, beside the identities, to determine positions, and directions of rows that were guessed."""
+            yield f"no position for {count_of(int(some.sum()), 'node')}: {why}"
+    if found is not None and not found.certified:
+        yield "elements, read off the graph, are not certified" if found.blocks else "no elements were recognised"
     if solution.planes:
         yield "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
     if solution.straight:
-        yield (
-            "the body is homogeneous and held all around, where the identities leave an affine map free that the "
-            "elements determined"
-        )
+        yield "the identities leave an affine map free, which elements determined"
     if guessed:
-        yield (
-            f"which directions {count_of(guessed, 'row', 'rows')} of nodes without coordinates belong to is not "
-            "proven: `direction_of_row` is -1 there, and rigid-body modes are zero"
-        )
+        yield f"directions of {count_of(guessed, 'row')} of nodes without coordinates are not proven, and -1"

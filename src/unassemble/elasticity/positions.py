@@ -9,6 +9,7 @@ stays valid, though A^{cb} x_a for other a does not. And x_b is constant over su
 That they lie in a plane is an assumption. It is refused where no exact null field is left with it.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from ..nodes.nodal import NodalMatrix, determined, eliminated, surrounded, valid_pairs
 from .nullspace.placing import Solution, placed
-from .straight import straightened
+from .straight import straight
 
 # Nodes of a body in space beyond which planes are asked at once where there are rollers: without them rows next to
 # rollers leave hundreds of fields free, all of which charts would look for.
@@ -40,9 +41,9 @@ def solve(nodal: NodalMatrix) -> Solution:
         if found is None or not (found.unique and np.isfinite(found.firm_points).all()):
             found = _with_planes(nodal, found, valid)
     if not (found is not None and found.unique):
-        found = straightened(nodal, found, valid)
-        if found is not None and found.straight and found.planes:  # elements told axes only, and no planes
-            found = replace(found, hanging=determined(found.points))
+        with suppress(GeometryError):
+            other = placed(nodal, valid, straight)
+            found = other if other.straight else found
     if found is None:
         raise failure or GeometryError("no positions fit the valid rows")
     return found

@@ -16,7 +16,7 @@ from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, CERTIFIED
 from ..words import Reason
-from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
+from .doubts import guessed_directions, notes, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.checked import checked
@@ -100,46 +100,29 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     ):
         if status == "certified" and against:
             status, reason = "uncertified", why
-    held = request.held(numbering.node_of_row, nodal.dim)
-    points, factor, notes, (status, reason) = anchored(
-        placed, component, len(solution.evidence), held, (status, reason), edge=1.0
-    )
-    lame, scale = _in_units(shown, component, factor, nodal.dim)
-    if np.isnan(factor).any():
-        notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
-    exchangeable = len(nodal.indices) == nodal.n**2 and numbering.kind != "given"
-    if exchangeable:  # of a rectangle, say, rows along y with those of opposite corners: those of its mirror image
-        notes.append("all nodes are coupled, as those of one element: which rows are of one node may be another choice")
     guessed = guessed_directions(numbering, loose)
+    masks, asked = (withheld, hanging, lone), shown if cells else None
+    said = (*solution.warnings, *notes(nodal, solution, asked, loose, masks, int(guessed.sum())))
+    rows = replace(numbering, direction_of_row=np.where(guessed, -1, numbering.direction_of_row))
+    free = "the sign of the scale is free: with a mesh its point reflection fits the matrix as well"
+    factor, shared = anchored(
+        request, rows, placed, component, solution.evidence, (status, reason), 1.0, notes=said, free=free
+    )
+    if len(nodal.indices) == nodal.n**2 and numbering.kind != "given":
+        # Of a rectangle, say, rows along y with those of opposite corners: those of its mirror image.
+        other = "all nodes are coupled, as those of one element: which rows are of one node may be another choice"
+        shared["warnings"] += (other,)
+        shared["uniqueness"] = shared["uniqueness"] and "ambiguous"
+    lame, scale = _in_units(shown, component, factor, nodal.dim)
     return Body(
         **fields_of(shown.blocks),
-        points=points,
-        component=component,
+        **shared,
         scale=scale,
-        node_status=loose.astype(np.int8),
-        status=status,
-        uniqueness=("ambiguous" if exchangeable else "searched") if status == "certified" else None,
-        reason=reason.text,
-        advice=reason.advice,
         operator="elasticity",
         backward_error=found.backward_error if found.certified else error,
         position_error=bar.error if bar and bar.explained else None,
-        timings=request.clock.timings,
-        warnings=(
-            *request.matrix.warnings,
-            *solution.warnings,
-            *(about_cells(shown) if cells else ()),
-            *about_nodes(nodal, loose, withheld, hanging, lone),
-            *about_assumptions(solution, int(guessed.sum())),
-            *notes,
-        ),
-        node_of_row=numbering.node_of_row,
-        direction_of_row=np.where(guessed, -1, numbering.direction_of_row),
-        numbering=numbering.kind,
-        choice=request.choice,
         poisson_ratio=None if ratio is None else poisson_ratio(ratio),
         lame=lame,
-        evidence=solution.evidence,
     )
 
 

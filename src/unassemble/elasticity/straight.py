@@ -21,7 +21,6 @@ T^{cc} is a multiple of the identity plus one of rank one, whose direction is w_
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -33,55 +32,37 @@ from ..elements.reference import rules
 from ..elements.surface import contested
 from ..linalg import svd
 from ..nodes.nodal import NodalMatrix, determined
-from ..nodes.shape import in_gauge, set_aside
+from ..nodes.shape import Shape, set_aside
 from ..recovery import Evidence
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR
 from .materials.cells import coupled
 from .materials.entries import Entries, Model, Pairs
 from .nullspace.atlas import null_fields
-from .nullspace.placing import Solution, pieces_of
 
 
-class _Straight(NamedTuple):
-    """A piece whose axes elements told: points (n, d), NaN elsewhere; lambda / mu; what the identities alone say."""
+def straight(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], body: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Shape] | None:
+    """Nodes (k,) of a piece whose axes elements tell, and its shape, from rows of its nodes (m,) that are whole.
 
-    points: NDArray[np.float64]
-    ratio: float
-    evidence: Evidence
-
-
-def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
-    """The solution, None where identities determine nothing, with bent pieces straight where elements explain them."""
-    whole = valid.all(axis=(1, 2))
-    if found is not None:  # pieces of which more than translation and scale is free
-        whole &= np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
-    inside = valid & whole.reshape(-1, 1, 1)
-    straight = list(_straight(nodal, inside)) if inside.any() else []
-    return _in_place(found, valid, straight) if straight else found
-
-
-def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_]) -> Iterator[_Straight]:
-    """Pieces that rows inside, (n, d, d) bool, hold together, and of which elements tell the axes."""
-    component, n_pieces = pieces_of(nodal, inside)
-    graph = nodal.graph
-    for piece in range(n_pieces):
-        body = np.flatnonzero(component == piece)
-        null = null_fields(nodal, inside, body, terms=np.empty((nodal.dim,) * 3 + (0,)))
-        exact = null.values <= SINGULAR
-        if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
-            continue
-        if (shown := _picture(null.fields[..., exact])) is None:
-            continue
-        held, picture, fields = shown
-        points = np.full((nodal.n, nodal.dim), np.nan)
-        points[null.nodes[held]] = picture
-        if (told := _frame(nodal, points)) is None:
-            continue
-        matrix, ratio = told
-        here = determined(points)
-        points[here] = in_gauge(points[here] @ matrix.T, graph[here][:, here])
-        residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
-        yield _Straight(points, ratio, Evidence(fields, residual, gap, null.rows))
+    What is `valid`, (n, d, d), see :func:`.nodal.valid_pairs`. None where more is free than an affine map, or no
+    elements explain it.
+    """
+    d = nodal.dim
+    inside = valid & valid.all(axis=(1, 2), keepdims=True)
+    null = null_fields(nodal, inside, body, terms=np.empty((d, d, d, 0)))
+    exact = null.values <= SINGULAR
+    if not len(exact) or exact[-1] or exact.sum() <= d or (shown := _picture(null.fields[..., exact])) is None:
+        return None
+    held, picture, fields = shown
+    points = np.full((nodal.n, d), np.nan)
+    points[null.nodes[held]] = picture
+    if (told := _frame(nodal, points)) is None:
+        return None
+    matrix, ratio = told
+    residual, gap = map(float, null.values[[d, exact.sum()]])
+    seen = Evidence(fields, residual, gap, null.rows)
+    return null.nodes[held], Shape(picture @ matrix.T, seen, ratio=ratio)
 
 
 def _picture(null: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64], int] | None:
@@ -106,24 +87,6 @@ def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
     flat = (null - null.mean(axis=0)).reshape(len(null), -1)
     u, s, _ = svd(flat, full_matrices=False)
     return np.asarray(u[:, s > ALIKE * max(s.max(initial=0), ALIKE)])
-
-
-def _in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[_Straight]) -> Solution:
-    """_Straight pieces, one at least, in place of the bent ones that they are part of."""
-    base = found or Solution(valid, np.empty(0, np.int64), np.empty(0), (), (), exact=True, warnings=())
-    better = {int(base.component[determined(one.points)].max()) for one in straight} if found else set()
-    parts = [
-        (base.component == k, base.points, *of_piece)
-        for k, of_piece in enumerate(zip(base.evidence, base.freedoms, strict=True))
-        if k not in better
-    ]
-    parts += [(determined(one.points), one.points, one.evidence, "") for one in straight]
-    component, points = np.full(len(valid), -1), np.full(straight[0].points.shape, np.nan)
-    for k, (here, x, _, _) in enumerate(parts):
-        component[here], points[here] = k, x[here]
-    _, _, evidence, freedoms = zip(*parts, strict=True)
-    ratios = tuple(one.ratio for one in straight)
-    return replace(base, component=component, points=points, evidence=evidence, freedoms=freedoms, straight=ratios)
 
 
 def _frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:

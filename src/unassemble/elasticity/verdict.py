@@ -1,6 +1,8 @@
 """Whether coordinates are certified, and why not."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,14 +17,9 @@ from .materials.cells import Cells
 from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
-NOTHING_CHECKED = Reason(
-    "no identities are left that have others to check against, so that wrong entries would go unnoticed, and no "
-    "elements were found that re-assemble to the matrix",
-    WITHOUT_SUPPORTS,
-)
+NOTHING_CHECKED = Reason("no identities have others to check against, and no elements re-assemble", WITHOUT_SUPPORTS)
 RESTS_ON_PLANES = Reason(
-    "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
-    "elements show that they do",
+    "too much is free unless nodes that lack a direction lie in planes across it, and no elements show that they do",
     WITHOUT_SUPPORTS,
 )
 
@@ -46,25 +43,22 @@ def verdict(
 
     `rounding` of entries is an error bar: how well positions are `known` with it, None where that was not asked.
     """
-    objection = _to_positions(nodal, solution, numbering, exact=known is None)
-    if known is None and not objection and found.certified and found.backward_error <= CERTIFIED:
-        count = count_of(sum(map(len, found.blocks.values())), "element")
-        return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
-    objection = objection or _to_identities(solution, error, numbering, nodal)
     holds = f"the valid identities hold to {error:.1e} (relative)"
-    if rounding and known:
+    shown = known is None and found.certified and found.backward_error <= CERTIFIED
+    objections = _to_positions(nodal, solution, numbering, exact=known is None)
+    if not shown:
+        objections = chain(objections, _to_identities(nodal, solution, error, numbering))
+    objection = next(objections, None)
+    if shown:
+        count = count_of(sum(map(len, found.blocks.values())), "element")
+        sure = f"the matrix re-assembled on the {count} is the given one"
+    elif rounding and known:
         sure = holds + known.within(rounding)
         objection = objection or known.objection(error, rounding, holds)
     else:
-        nearly = _softest(solution)
         sure = "the valid identities hold to rounding, and only translations and scale satisfy them"
-        if error > CERTIFIED:
-            objection = objection or Reason(f"the largest residual of a valid identity is {error:.1e} (relative)")
-        elif error > _MAGNIFIED * nearly:
-            objection = objection or Reason(
-                f"{holds}, but a field that is no translation or scale satisfies them up to {nearly:.1e}: nodes that "
-                "it moves may be wrong by more than 1e-8"
-            )
+        objection = objection or (Reason(holds) if error > CERTIFIED else None)
+        objection = objection or (_soft(solution) if error > _MAGNIFIED * _softest(solution) else None)
     if objection and rounding:
         more = f"write more digits of the entries: they are rounded to {rounding.name}, which may hide what rows lack"
         objection = replace(objection, advice=more)
@@ -76,58 +70,50 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason | None:
-    """Why positions may be wrong whatever elements say; None where nothing is to be said.
+def _soft(solution: Solution) -> Reason:
+    """That such a field is next to nothing."""
+    free = (
+        f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and nodes "
+    )
+    return Reason.of(
+        free + "that it moves may be wrong", "slender bodies have such fields, and nodes that few rows hold"
+    )
 
-    Entries that are rounded have no `exact` null vector.
-    """
+
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool) -> Iterator[Reason]:
+    """Why positions may be wrong whatever elements say; entries that are rounded have no `exact` null vector."""
     if any(solution.freedoms):
         unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
         larger = "an affine map stays free, since the material around every valid row is homogeneous"
-        return Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
+        yield Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
     if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
-        return Reason.of(
-            f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
-            f"{worst.gap:.1e})",
-            "the points are the best fit, as for materials that are not isotropic, elements that do not reproduce "
-            "linear functions, or nodes that constraints tie together",
+        yield Reason.of(
+            f"no exact null vector exists (singular value {worst.residual:.1e}, of the next field {worst.gap:.1e})",
+            "the points are the best fit, as of materials that are not isotropic, or nodes that are tied together",
         )
     if _softest(solution) < SOFT:
-        return Reason.of(
-            f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
-            "nodes that it moves may be wrong by more than 1e-8",
-            "slender bodies have such fields, and nodes that few rows hold",
-        )
+        yield _soft(solution)
     if _torn(nodal, solution):
-        return Reason.of(
-            "coupled nodes came out as separate pieces, and how these lie to each other is not known",
-            "rows between them lack entries, or belong to other axes, as at inclined supports, or to other nodes",
-            advice=GIVE_NUMBERING,
-        )
-    return None
+        torn = "coupled nodes came out as separate pieces, and how these lie to each other is not known"
+        yield Reason.of(torn, "rows between them lack entries, or belong to other axes or nodes", advice=GIVE_NUMBERING)
 
 
-def _to_identities(solution: Solution, error: float, numbering: Numbering, nodal: NodalMatrix) -> Reason | None:
-    """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
+def _to_identities(nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering) -> Iterator[Reason]:
+    """Why identities alone, without elements that re-assemble, certify nothing."""
     if solution.straight:
-        return Reason(
-            "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
-        )
+        yield Reason("elements told the axes of a homogeneous body, but re-assembled the matrix is not the given one")
     if numbering.likely:
-        return Reason.of(
-            "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
-            "that vanished",
-            "only elements that re-assemble to the matrix would show that it is right",
-            advice=GIVE_NUMBERING,
-        )
+        likely = "which rows belong to one node was inferred, and no elements that re-assemble show that it is right"
+        yield Reason(likely, GIVE_NUMBERING)
     # Without a trace, doubtful ones aside, which get no coordinates.
     odd = int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
     if odd:
         nodes = count_of(odd, "node lacks", "nodes lack")
         lacking = f"{nodes} directions although no row next to it misses anything: its rows belong to other nodes"
-        return Reason(lacking, GIVE_NUMBERING)
-    return NOTHING_CHECKED if np.isnan(error) else None
+        yield Reason(lacking, GIVE_NUMBERING)
+    if np.isnan(error):
+        yield NOTHING_CHECKED
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:

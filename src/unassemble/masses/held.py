@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..certify import Terms
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
-from ..reductions import ConstantTensor
 from ..scalar.held import held
 from ..tolerances import CERTIFIED, SIGMAS
 
@@ -21,11 +20,11 @@ Plain = Callable[..., PlanarMesh]
 class Held:
     """A matrix, its row sums, of which c L has none and s M the integrals of s times its basis functions, and a tensor.
 
-    `tensor`: to be undone.
+    `tensor`: (kxx, kxy, kyy) to be undone.
     """
 
     matrix: OperatorMatrix
-    tensor: ConstantTensor | None = None
+    tensor: tuple[float, float, float] | None = None
 
     @cached_property
     def rounding(self) -> NDArray[np.float64]:

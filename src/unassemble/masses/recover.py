@@ -25,7 +25,6 @@ from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
-from ..reductions import ConstantTensor
 from ..tolerances import ALIKE, CERTIFIED, SUMMED
 from ..topology import Topology
 from ..topology.surface import Together
@@ -36,12 +35,12 @@ from .settled import less_mass, settled
 
 
 def recover_with_terms(
-    matrix: OperatorMatrix, plain: Plain, clock: Clock, tensor: ConstantTensor | None = None
+    matrix: OperatorMatrix, plain: Plain, clock: Clock, tensor: tuple[float, float, float] | None = None
 ) -> PlanarMesh:
     """The mesh of a scalar matrix of linear triangles.
 
     `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
-    `tensor`: to be undone.
+    `tensor`: (kxx, kxy, kyy) to be undone.
     """
     held, found = Held(matrix, tensor), None
     if not held.has_sums.any():

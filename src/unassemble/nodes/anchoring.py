@@ -1,7 +1,7 @@
 """What is asked for beside the matrix; known positions: one fixes the translation of its piece, two size and sign."""
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..errors import InputError
 from ..matrix import OperatorMatrix
+from ..recovery import Evidence
 from ..tolerances import ALIKE, SUMMED
 from ..words import Reason
+from .numbering import Rows
 from .rounded import Rounding
-
-Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Request:
     choice: str = ""  # why the matrix was taken for what it is
     rounding: Rounding | None = None  # of the entries, where they have few digits
 
-    def held(self, node_of_row: NDArray[np.int64], d: int) -> Anchors:
+    def held(self, node_of_row: NDArray[np.int64], d: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,) and known positions (k, d) of the anchors.
 
         InputError for rows that do not exist or belong to one node, and positions of another dimension.
@@ -54,23 +54,27 @@ class Request:
 
 
 def anchored(
+    request: Request,
+    rows: Rows,
     points: NDArray[np.float64],
     component: NDArray[np.int64],
-    n_pieces: int,
-    anchors: Anchors,
+    evidence: tuple[Evidence, ...],
     verdict: tuple[str, Reason],
     edge: float,
     *,
     sized: bool = False,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str], tuple[str, Reason]]:
-    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With factor, notes, verdict.
+    notes: Iterable[str],
+    free: str,
+) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With what results share.
 
-    The factor, (n_pieces,), is that by which each piece was enlarged; negative where it was reflected in a point, NaN
-    where the size is by convention. What was certified is not if its coordinates, of that mean `edge`, lost more digits
-    than entries would bear, as they do far from the origin.
+    The factor, one for each piece, is that by which it was enlarged; negative where it was reflected in a point, NaN
+    where the size is by convention, and what is `free` is said. What was certified is not if its coordinates, of that
+    mean `edge`, lost more digits than entries would bear, as they do far from the origin.
     """
-    nodes, places = anchors
-    points, factor, notes, lost = points.copy(), np.full(n_pieces, 1.0 if sized else np.nan), [], 0.0
+    nodes, places = request.held(rows.node_of_row, points.shape[1])
+    points, factor, lost = points.copy(), np.full(len(evidence), 1.0 if sized else np.nan), 0.0
+    notes = [*request.matrix.warnings, *notes]
     adrift = nodes[component[nodes] < 0]
     if len(adrift):
         notes.append(f"the anchored nodes {', '.join(map(str, adrift))} are not determined and were not used")
@@ -89,14 +93,30 @@ def anchored(
         misfit = float(np.linalg.norm(points[nodes[here]] - wanted, axis=1).max())
         if here.sum() > 1 and misfit > ALIKE * np.linalg.norm(y, axis=1).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
-    if verdict[0] == "certified" and lost > SUMMED:
-        verdict = (
-            "uncertified",
-            Reason.of(
-                f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge "
-                "lengths: they have too few digits left",
-                f"before, {verdict[1].text}",
-                advice="subtract a point near the anchors from all of `anchors`",
-            ),
+    if np.isnan(factor).any():
+        notes.append(free)
+    status, reason = verdict
+    if status == "certified" and lost > SUMMED:
+        status = "uncertified"
+        reason = Reason.of(
+            f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge lengths: "
+            "they have too few digits left",
+            f"before, {reason.text}",
+            advice="subtract a point near the anchors from all of `anchors`",
         )
-    return points, factor, notes, verdict
+    return factor, {
+        "points": points,
+        "component": component,
+        "node_status": (component < 0).astype(np.int8),
+        "evidence": evidence,
+        "status": status,
+        "uniqueness": "searched" if status == "certified" else None,
+        "reason": reason.text,
+        "advice": reason.advice,
+        "timings": request.clock.timings,
+        "warnings": tuple(notes),
+        "node_of_row": rows.node_of_row,
+        "direction_of_row": rows.direction_of_row,
+        "numbering": rows.kind,
+        "choice": request.choice,
+    }

@@ -13,15 +13,26 @@ from .orders import ORDERS, Reading
 
 
 @dataclass(frozen=True, eq=False)
-class Numbering:
+class Rows:
     """Nodes and directions of the N rows of a vector-valued matrix."""
 
-    block_size: int
     node_of_row: NDArray[np.int64]  # numbered by their first row
-    direction_of_row: NDArray[np.int64]
-    identity_row: NDArray[np.bool_]  # those that couple to nothing: unknowns replaced by the identity
+    direction_of_row: NDArray[np.int64]  # -1 where it is not known
     kind: str  # "interleaved", "by component", "pattern" or "given"
     share: float  # of the pairs (row, direction) whose entries add up to zero, among rows that couple
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(self.node_of_row.max()) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering(Rows):
+    """Those of a solid, and what speaks for them."""
+
+    block_size: int
+    identity_row: NDArray[np.bool_]  # those that couple to nothing: unknowns replaced by the identity
     common: float  # how far the rows of a node couple to the same nodes: 1 if all do
     # nodes that lack a direction without a trace; in an order without gaps, those whose rows cannot be one node's
     odd: int = 0
@@ -42,11 +53,6 @@ class Numbering:
     def likely(self) -> bool:
         """Whether rows of different patterns were joined where some are missing: only elements show that this is so."""
         return self.kind != "given" and self.incomplete and self.common < 1
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return int(self.node_of_row.max()) + 1
 
     @property
     def quality(self) -> float:
@@ -76,4 +82,4 @@ def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searc
     common = coupled_in_common(matrix, node)
     odd = int(unaccounted(matrix, node, direction, d).any(axis=1).sum()) if searched else 0
     identity = row_sizes(matrix) == 0
-    return Numbering(d, node, direction, identity, kind, share, common, odd, reading.open_row, reading.unnamed)
+    return Numbering(node, direction, kind, share, d, identity, common, odd, reading.open_row, reading.unnamed)

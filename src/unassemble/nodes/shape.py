@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..linalg import svd
+from ..recovery import Evidence
 from ..tolerances import ALIKE, CANCELLED, SINGULAR
 
 SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8
@@ -22,17 +23,17 @@ class Shape:
 
     # (n, d) centred, of norm one; NaN where loose: of nodes that can move while the others stay
     points: NDArray[np.float64]
-    dimension: int  # of the null space without loose nodes; that of the translations where no field is exact
-    freedom: str  # beyond translation and scale: "" or "affine"
-    exact: bool  # whether the field is a null field, not only the best one
-    null: int  # fields that count as null fields, those of loose nodes among them
+    evidence: Evidence
+    freedom: str = ""  # beyond translation and scale: "" or "affine"
+    exact: bool = True  # whether the field is a null field, not only the best one
+    ratio: float | None = None  # lambda / mu, where elements told the axes
 
 
-def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
+def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_], rows: int) -> Shape:
     """Find the coordinates among least singular fields (n, d, k), orthonormal, with increasing singular values (k,).
 
-    Nodes with a valid row of their own, `told` (n,), are not left loose by supports. GeometryError if the null space
-    leaves more than an affine map free, or there are too few nodes.
+    Nodes with a valid row of their own, `told` (n,), are not left loose by supports; `rows` have equations.
+    GeometryError if the null space leaves more than an affine map free, or there are too few nodes.
     """
     n, d, k = fields.shape
     if k <= d:
@@ -57,7 +58,8 @@ def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArra
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
     points[~loose], freedom = _choose(moving, exact=bool(exact))
-    return Shape(points, dimension, freedom, bool(exact), count)
+    gap = float(values[max(count, common) :].min(initial=np.inf))
+    return Shape(points, Evidence(dimension, float(values[d]), gap, rows), freedom, bool(exact))
 
 
 def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:

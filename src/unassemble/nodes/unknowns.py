@@ -26,37 +26,25 @@ MORE_THAN_STIFFNESS = (
 )
 
 
-def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbering:
+def find_numbering(matrix: sp.csr_array, block_size: int | None = None, *, at_sight: bool = False) -> Numbering:
     """Recognise nodes and directions of a symmetric matrix (N, N), with 2 or 3 unknowns per node if that is known.
 
-    InputError for other block sizes, RecoveryError if no numbering makes rows annihilate constants.
+    Nodes are looked for `at_sight` only where a glance shows that there are some: unknowns in order, or rows of the
+    same pattern. InputError for other block sizes, RecoveryError if no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
     best = _in_order(matrix, sizes)
+    shown = not at_sight or (best is not None and best.common > NEARLY_ALL)
     if best is None or not best.clear:
-        best = _best([best, *searched(matrix, sizes)])
+        group = same_pattern(matrix, row_sizes(matrix) == 0)  # which several nodes may share
+        shown = shown or bool(np.mean(np.bincount(group)[group] > 1) > 0.5)
+        best = _best([best, *searched(matrix, sizes)]) if shown else None
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
             f"this is no elasticity matrix, or {MORE_THAN_STIFFNESS}, or supports take entries from nearly all rows"
         )
     return best
-
-
-def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
-    """The same where a glance shows nodes: unknowns in order, or rows of the same pattern. None if neither is so.
-
-    The glance tells that there are nodes. Which rows are theirs next to supports takes the search, unless unknowns
-    stand in order and no row is missing.
-    """
-    best = _in_order(matrix, (3, 2))
-    if best is not None and best.clear:
-        return best
-    if best is None or best.common <= NEARLY_ALL:
-        group = same_pattern(matrix, row_sizes(matrix) == 0)
-        if 2 * np.count_nonzero(np.bincount(group)[group] > 1) <= len(group):  # several nodes may share a pattern
-            return None
-    return _best([best, *searched(matrix, (3, 2))])
 
 
 def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:

@@ -10,34 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Certificate, Terms, certify, chi_square_verdict
-from ..certify_elements import certify_elements
 from ..matrix import OperatorMatrix
 from ..recovery import ConformingMesh, PlanarMesh
-from ..reductions import ConstantTensor
 from ..tolerances import CERTIFIED, CHANCE, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
 from .noise import Noise
 from .solving import Solved
 
 
 def held(
-    matrix: OperatorMatrix, mesh: PlanarMesh, tensor: ConstantTensor | None = None, terms: Terms | None = None
+    matrix: OperatorMatrix,
+    mesh: PlanarMesh,
+    tensor: tuple[float, float, float] | None = None,
+    terms: Terms | None = None,
 ) -> Certificate:
-    """A mesh against a matrix, its entries only or, with further terms, all of it; `tensor`: K of div(K grad)."""
-
-    def factor(cells: NDArray) -> NDArray:
-        return mesh.scale[mesh.component[cells].max(axis=1)]  # a hinge carries the lowest label
-
-    if not isinstance(mesh, ConformingMesh):
-        triangles, K = mesh.divided()[0], (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
-        return certify(matrix.edges, matrix.entries, mesh.points, triangles, factor(triangles), K, terms)
-    points, times = mesh.points, 1.0
-    if tensor:  # c div(K grad) is a Laplacian of factor c sqrt(det K) in coordinates that K stretches
-        z, times = tensor.to_laplacian(points @ [1, 1j]), tensor.root_determinant
-        points = np.column_stack([z.real, z.imag])
-    factors = {name: times * factor(cells) for name, cells in mesh.cells.items()}
-    names = mesh.quadrature.split(", ")
-    rules = {kind: next(one for one in names if ("Gauss" in one) == kind.startswith("quad")) for kind in factors}
-    return certify_elements(matrix.edges, matrix.entries, points, mesh.cells, factors, rules, terms)
+    """A mesh against a matrix, its entries only or, with further terms, all of it; `tensor`: (kxx, kxy, kyy)."""
+    cells, rules = {"triangle": mesh.divided()[0]}, {"triangle": "degree 1"}
+    if isinstance(mesh, ConformingMesh):
+        cells, names = mesh.cells, mesh.quadrature.split(", ")
+        rules = {kind: next(one for one in names if ("Gauss" in one) == kind.startswith("quad")) for kind in cells}
+    factors = {kind: mesh.scale[mesh.component[own].max(axis=1)] for kind, own in cells.items()}  # hinges: the lowest
+    given = matrix.edges, matrix.entries, mesh.points
+    return certify(*given, cells, factors, rules=rules, tensor=tensor, terms=terms)
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,9 +84,9 @@ def finished(
         shift = origins[topology.component]
         written = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        near = far = Held(held(solved.stored, mesh, placement.tensor), solved)
+        near = far = Held(held(solved.stored, mesh, placement.coefficients), solved)
         if origins.any():
-            far = Held(held(solved.stored, replace(mesh, points=written), placement.tensor), solved)
+            far = Held(held(solved.stored, replace(mesh, points=written), placement.coefficients), solved)
         evidence = weigh(solved, near.certificate, search=not near.passes)
     deviations = None
     if options.standard_deviations:

@@ -9,13 +9,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..nodes.anchoring import Request, anchored
-from ..nodes.numbering import Numbering
+from ..nodes.numbering import Rows
 from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Structure
 from ..tolerances import ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .placed import Placed
-from .recognise import StructuralNumbering
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +60,8 @@ def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
 
 
 def answer(
-    numbering: Numbering | StructuralNumbering,
     request: Request,
+    rows: Rows,
     found: Placed,
     held: Held,
     *,
@@ -88,27 +87,8 @@ def answer(
     if verdict[0] == "certified" and doubts is not None:
         verdict = "uncertified", doubts
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
-    anchors = request.held(numbering.node_of_row, found.points.shape[1])
-    points, factor, more, (status, reason) = anchored(
-        found.points, found.component, len(found.evidence), anchors, verdict, edge, sized=sized
-    )
-    return Structure(
-        points=points,
-        component=found.component,
-        scale=np.full(len(factor), np.nan),
-        node_status=(found.component < 0).astype(np.int8),
-        evidence=found.evidence,
-        status=status,
-        uniqueness="searched" if status == "certified" else None,
-        reason=reason.text,
-        advice=reason.advice,
-        backward_error=held.error,
-        position_error=known.error if held.rounding and known.explained else None,
-        timings=request.clock.timings,
-        warnings=(*request.matrix.warnings, *found.notes, *notes, *([free] if np.isnan(factor).any() else []), *more),
-        node_of_row=numbering.node_of_row,
-        direction_of_row=numbering.direction_of_row,
-        numbering=numbering.kind,
-        choice=request.choice,
-        **fields,
-    )
+    said, placed = (*found.notes, *notes), (found.points, found.component, found.evidence)
+    factor, shared = anchored(request, rows, *placed, verdict, edge, sized=sized, notes=said, free=free)
+    off = known.error if held.rounding and known.explained else None
+    scale = np.full(len(factor), np.nan)
+    return Structure(scale=scale, backward_error=held.error, position_error=off, **shared, **fields)

@@ -54,7 +54,7 @@ def find_beam(matrix: sp.csr_array) -> StructuralNumbering | None:
     node[springs] = told[np.minimum(np.searchsorted(np.minimum(told, partner[told]), springs), len(told) - 1)]
     if len(np.unique(node[springs])) == len(springs):
         direction[springs] = 0
-    return StructuralNumbering(ALONG_X, by_first_row(node), direction, "pattern", float(np.mean(direction > 0)))
+    return StructuralNumbering(by_first_row(node), direction, "pattern", float(np.mean(direction > 0)), ALONG_X)
 
 
 def _members(off: sp.csr_array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -74,18 +74,11 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
                      f"left out unless you {GIVE_NUMBERING}")  # fmt: skip
+    notes += about_loose(found.component < 0, "at supports, or tied to these only")
+    free = "size and sign are free: nodes have no rotations, from which angles would tell lengths"
+    edges, fields["operator"] = np.column_stack(sp.triu(nodes.graph, 1).nonzero()), layout.name
     return answer(
-        numbering,
-        request,
-        found,
-        held,
-        edges=np.column_stack(sp.triu(nodes.graph, 1).nonzero()),
-        sized=sized,
-        free="size and sign are free: nodes have no rotations, from which angles would tell lengths",
-        doubt=doubt,
-        notes=[*notes, *about_loose(found.component < 0, "at supports, or tied to these only")],
-        operator=layout.name,
-        **fields,
+        request, numbering, found, held, edges=edges, sized=sized, free=free, doubt=doubt, notes=notes, **fields
     )
 
 

@@ -24,30 +24,15 @@ def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int6
 
 
 def with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes and directions (N,) of rows that stand node by node; -1 for those of nodes that lack some of b unknowns."""
+    """Nodes and directions (N,) of rows that stand node by node; -1 for those of nodes that lack some of b unknowns.
+
+    Rows of one node couple to nearly the same unknowns, so that hardly a number is a zero and the indices are shared;
+    rows of two nodes share few. The shortest description is found by dynamic programming.
+    """
     shown = [_shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
-    node = _shortest_runs(matrix, b, np.any(shown, axis=0))
+    node = _cut(sp.csr_array(pattern_of(matrix)), b, np.any(shown, axis=0))
     within = np.arange(len(node)) - np.searchsorted(node, node)
     return node, np.where(np.bincount(node)[node] == b, within, -1)
-
-
-def _shortest_runs(matrix: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(N,) nodes of neighbouring rows, each of at most so many; a node of so many `begins` with some rows, (N,).
-
-    Rows of one node couple to nearly the same unknowns, so that hardly a number is
-    a zero and the indices are shared; rows of two nodes share few. The shortest description is found by dynamic
-    programming. What it takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
-    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes.
-    """
-    order = matrix.shape[0]
-    pattern = sp.csr_array(pattern_of(matrix))
-    node = np.arange(order)
-    while True:
-        onto = sp.csr_array((np.ones(order, np.float32), (np.arange(order), node)))
-        cut = _cut(sp.csr_array(pattern @ onto), most, begins)
-        if cut[-1] >= node[-1]:
-            return node
-        node = cut
 
 
 def _cut(pattern: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -25,10 +25,10 @@ def up_to_size(piece: Piece, d: int) -> tuple[NDArray[np.float64], Evidence, NDA
     GeometryError if more is free than translations and size.
     """
     n, m = len(piece.nodes), len(piece.rows)
-    _, residuals, fields, values, gap = least_squares(piece.operator, np.zeros(m), d)
-    one = shape(fields, values, np.zeros(n, dtype=bool))
+    _, residuals, fields, values, _ = least_squares(piece.operator, np.zeros(m), d)
+    one = shape(fields, values, np.zeros(n, dtype=bool), m)
     links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n))
-    return in_gauge(one.points, links), Evidence(one.dimension, float(values[d]), gap, m), residuals[:, 1:]
+    return in_gauge(one.points, links), one.evidence, residuals[:, 1:]
 
 
 def least_squares(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..nodes.grouping import by_first_row, pattern_of
+from ..nodes.numbering import Rows
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .gaps import continued, with_gaps
@@ -23,19 +24,10 @@ _KNOWN = (*SOLIDS.values(), *LAYOUTS)
 
 
 @dataclass(frozen=True, eq=False)
-class StructuralNumbering:
+class StructuralNumbering(Rows):
     """Nodes and directions of the rows of a structure's matrix."""
 
     layout: Layout
-    node_of_row: NDArray[np.int64]
-    direction_of_row: NDArray[np.int64]  # -1 where it is not known
-    kind: str  # "interleaved", "by component" or "given"
-    share: float  # of the rows, that annihilate all translations
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return int(self.node_of_row.max()) + 1
 
     @property
     def block_size(self) -> int:
@@ -88,7 +80,7 @@ def _best(
 ) -> StructuralNumbering | None:
     """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
     found = [
-        StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
+        StructuralNumbering(*numbering, name, _share(matrix, layout, numbering[1]), layout)
         for layout in _KNOWN
         for (b, name), numbering in numberings.items()
         if layout.block_size == b and block_size in (None, b)
@@ -109,7 +101,7 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     if len(np.unique(node * size + direction)) < len(node):
         return None
     fitting = [layout for layout in LAYOUTS if layout.block_size == size]
-    found = [StructuralNumbering(one, node, direction, "given", _share(matrix, one, direction)) for one in fitting]
+    found = [StructuralNumbering(node, direction, "given", _share(matrix, one, direction), one) for one in fitting]
     best = max(found, key=lambda one: one.share, default=None)
     return best if best and (size == SPACE.block_size or best.share > HARDLY_ANY) else None
 

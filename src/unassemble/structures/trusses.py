@@ -88,7 +88,7 @@ def truss_numbering(
     sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
     for d, name in product(sizes, ORDERS if kind is None else (kind,)):
         node, direction = regular(order, d, name)
-        numbering = Numbering(d, node, direction, row_sizes(matrix) == 0, name, 0.0, 1.0)
+        numbering = Numbering(node, direction, name, 0.0, d, row_sizes(matrix) == 0, 1.0)
         if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
             return numbering
     return None
@@ -116,17 +116,11 @@ def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: R
         f"blocks are off those of bars by {error:.1e} of a row's largest",
     )
     lines = bars.ends[~loose[bars.ends].any(axis=1)]
+    held = Held(error, misfits, again, rounding, said, rows, rows)
+    free = "the sign of the scale is free: the point reflection of a truss has the same matrix"
+    notes = about_loose(loose, "the directions of all bars leave them room")
     return answer(
-        numbering,
-        request,
-        found,
-        Held(error, misfits, again, rounding, said, rows, rows),
-        edges=lines,
-        sized=False,
-        free="the sign of the scale is free: the point reflection of a truss has the same matrix",
-        notes=about_loose(loose, "the directions of all bars leave them room"),
-        lines=lines,
-        operator="truss",
+        request, numbering, found, held, edges=lines, sized=False, free=free, notes=notes, lines=lines, operator="truss"
     )
 
 

@@ -3,6 +3,7 @@
 Of springs no linear field knows: what hangs on them alone has no position.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import GeometryError
 from ...nodes.nodal import NodalMatrix, determined, valid_pairs
-from ...nodes.shape import in_gauge, shape
+from ...nodes.shape import Shape, in_gauge, shape
 from ...recovery import Evidence
 from ...tolerances import ALIKE, SINGULAR
 from .atlas import null_fields
@@ -54,12 +55,17 @@ class Solution:
         return self.exact, not any(self.freedoms), int(firm), int(points)
 
 
-def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
+# Some nodes of a piece and their shape; of a matrix, its valid rows and the nodes that the identities leave bent.
+Straighten = Callable[[NodalMatrix, NDArray[np.bool_], NDArray[np.int64]], tuple[NDArray[np.int64], Shape] | None]
+
+
+def placed(nodal: NodalMatrix, valid: NDArray[np.bool_], straighten: Straighten | None = None) -> Solution:
     """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d); GeometryError if no piece has any."""
     component, n_pieces = pieces_of(nodal, valid)
     graph, d = nodal.graph, nodal.dim
     points = np.full((nodal.n, d), np.nan)
-    evidence, freedoms, exact, warnings = [], [], [], []
+    shapes: list[Shape] = []
+    warnings: list[str] = []
     failure: GeometryError | None = None
     told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
     for piece in range(n_pieces):
@@ -75,26 +81,30 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
                     f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation. The "
                     "points are those of smaller parts, joined, whose distances may be far from right"
                 )
+        one: tuple[NDArray[np.int64], Shape] | None = None
         try:
-            one = shape(found.fields, found.values, told[found.nodes])
+            one = found.nodes, shape(found.fields, found.values, told[found.nodes], found.rows)
         except GeometryError as error:
-            failure = failure or error
-            warnings.append(f"piece {piece} with node {body[0]}: {error}")
-            evidence.append(Evidence(int((found.values < SINGULAR).sum()), float("nan"), float("nan"), found.rows))
-            freedoms.append("")
+            why = error
+        if straighten is not None and (one is None or one[1].freedom):
+            one = straighten(nodal, valid, body) or one
+        if one is None:
+            failure = failure or why
+            warnings.append(f"piece {piece} with node {body[0]}: {why}")
+            lost = Evidence(int((found.values < SINGULAR).sum()), float("nan"), float("nan"), found.rows)
+            shapes.append(Shape(np.empty((0, d)), lost))
             continue
-        points[found.nodes] = one.points
+        points[one[0]] = one[1].points
         points[body] = in_gauge(points[body], graph[body][:, body])
-        null = max(one.null, d + 1)
-        gap = float(found.values[null]) if null < len(found.values) else float("inf")
-        evidence.append(Evidence(one.dimension, float(found.values[d]), gap, found.rows))
-        freedoms.append(one.freedom)
-        exact.append(one.exact)
+        shapes.append(one[1])
     points[drawn_together(nodal, valid, points)] = np.nan
-    if not exact:
+    if not any(len(one.points) for one in shapes):
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
-    return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
+    evidence, freedoms = tuple(one.evidence for one in shapes), tuple(one.freedom for one in shapes)
+    straight = tuple(one.ratio for one in shapes if one.ratio is not None)
+    exact = all(one.exact for one in shapes)
+    return Solution(valid, component, points, evidence, freedoms, exact, tuple(warnings), straight=straight)
 
 
 def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
