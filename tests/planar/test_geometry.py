@@ -8,7 +8,6 @@ from unassemble import GeometryError, SolverError
 from unassemble.certify import certify
 from unassemble.linalg import SamplingOptions
 from unassemble.planar import (
-    ConformalOptions,
     PolishOptions,
     WeightJacobian,
     canonical_frame,
@@ -96,7 +95,7 @@ def test_scale_one_takes_one_factorisation():
 
 def test_search_that_is_cut_short_says_so():
     piece, weights, _ = single_piece(500, c=7.0)
-    found = conformal_map(piece, weights, options=ConformalOptions(max_factorisations=1, krylov_steps=2))
+    found = conformal_map(piece, weights, most=1)
     assert not found.converged
 
 

@@ -28,15 +28,8 @@ from .pencil import ConformalPencil, ShiftedSearch
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class ConformalOptions:
-    """Settings of the search; the defaults serve every matrix that we know."""
-
-    krylov_steps: int = 8  # most solves with one factorisation
-    max_factorisations: int = 8  # factorisations before giving up
-    first_shift: float = 0.7  # relative to the estimate of c; any value well inside (0, 1) will do
-    # distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
-    margin: float = 1e-11
+_STEPS = 8  # most solves with one factorisation
+_MARGIN = 1e-11  # distance of the last shift below c, relative; nearer, M would be singular to working accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +69,18 @@ def conformal_map(
     scale: float | None = None,
     unit: float | None = None,
     sharp: bool = True,
-    options: ConformalOptions | None = None,
+    first_shift: float = 0.7,
+    most: int = 8,
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
     `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise c = 1 is tried first if the
     median of what triangles say allows it. `unit`: a guess of c, where weights are not those of the piece's triangles;
     c = 1 is then tried once that is near. `sharp`: go on until z, not only c, has converged, which a polish does not
-    need.
+    need. `first_shift`: relative to the guess of c, well inside (0, 1) or 0; `most`: factorisations before giving up.
 
     Raises GeometryError if no map of positive area is found.
     """
-    options = options or ConformalOptions()
     likely, whole = None, 1 / unit if unit else np.inf
     if unit is None:
         unit = estimate_scale(piece, weights)
@@ -105,26 +98,26 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, options.krylov_steps)
+    search = ShiftedSearch(pencil, _STEPS)
     z = start = _smooth_start(piece)
     known = scale if scale is not None else likely
     spread = None
     if known is not None:
-        z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
+        z, c, _ = search.at(known / unit * (1 - _MARGIN), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
         spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     if spread is None:
-        z, c, spread = search.at(options.first_shift, start)
+        z, c, spread = search.at(first_shift, start)
         if c < ALIKE:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
-    while search.factorisations < options.max_factorisations:
-        distance = min(max(4 * spread, options.margin), 0.3)
+    while search.factorisations < most:
+        distance = min(max(4 * spread, _MARGIN), 0.3)
         one = abs(c / whole - 1) <= distance
-        z, c, spread = search.at(whole * (1 - options.margin) if one else c * (1 - distance), z)
+        z, c, spread = search.at(whole * (1 - _MARGIN) if one else c * (1 - distance), z)
         near, whole = one or distance <= 1e-9, np.inf if one else whole
         converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:

@@ -18,7 +18,6 @@ class JoinedMesh:
 
     points: NDArray[np.float64]  # (n, 2) NaN for vertices of no piece
     triangles: NDArray[np.int64]  # (m, 3) counter-clockwise; those of divided polygons included
-    triangle_piece: NDArray[np.int64]  # (m,)
     in_polygon: NDArray[np.bool_]  # (m,) triangles that are part of a polygon
     polygons: Polygons  # counter-clockwise
     component: NDArray[np.int64]  # (n,) piece of each point, the lowest at hinges, -1 for none
@@ -64,7 +63,6 @@ class JoinedMesh:
         return cls(
             points=points,
             triangles=pieces.vertices[triangles],
-            triangle_piece=pieces.triangle_piece,
             in_polygon=in_polygon,
             polygons=polygons.counter_clockwise(points),
             component=topology.component,
