@@ -20,7 +20,7 @@ from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
 from .held import Held, held
-from .joined import JoinedMesh
+from .joined import joined
 from .noise import Noise
 from .notes import vanished_notes
 from .placement import Placement
@@ -51,16 +51,11 @@ def recover_scalar(
         sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
 
     def drawn(placed: list[NDArray]) -> PlanarMesh:
-        mesh = JoinedMesh.of(topology, placed, solved.scales / placement.stretch)
-        return PlanarMesh(**mesh.fields(), points=mesh.points, n_holes=topology.n_holes, operator=placement.operator)
+        return joined(topology, placed, solved.scales / placement.stretch, placement.operator)
 
     said = (*vanished_notes(topology), *topology.failures)
     found = finished(solved, drawn, partial(_other_meshes, clock), said, clock, sizes)
-    if options.triangulate:
-        none = Polygons.none()
-        cells = found.divided()[0]
-        found = replace(found, triangles=cells, polygons_offsets=none.offsets, polygons_data=none.vertices)
-    return found
+    return found.triangulated() if options.triangulate else found
 
 
 def finished(
@@ -103,7 +98,6 @@ def finished(
         mesh,
         **far.fields(10 if refused else 0, evidence.suspects),
         points=written,
-        hinges=topology.hinges,
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=status,
         uniqueness=uniqueness,
