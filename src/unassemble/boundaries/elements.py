@@ -86,7 +86,7 @@ def _report(
     own = [fit.fit for fit in fits]
     topology = Topology(matrix.n, matrix.edges, tuple(one.part.piece for one in own), "cliques")
     told = [(fit.fit.part.piece.vertices, fit.known_nodes) for fit in fits]
-    placement, said = placement.upon(matrix.n, told)
+    placement, said = placement.upon(topology, [known for _, known in told])
     with clock("place"):
         placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
         mesh = joined(topology, own, placed, placement)

@@ -56,7 +56,7 @@ def recover_lattice(
     (piece,), tensor = topology.pieces, placement.tensor
     status[topology.multiplicity == 0] = 1
     with clock("place"):
-        placement, loose = placement.upon(n, [(np.arange(n), status == 0)])
+        placement, loose = placement.upon(topology, [status[piece.vertices] == 0])
         z = np.full(n + int((row >= n).sum()), np.nan, dtype=np.complex128)
         z[row] = (lattice.z - lattice.z.mean()) / np.ptp(lattice.z.real)  # of size one: else digits are lost below
         placed, notes = placement.apply(piece, z[piece.vertices])

@@ -124,14 +124,14 @@ class _Placed:
         found = [(piece, mesh) for piece, mesh in zip(topology.pieces, meshes, strict=True) if mesh is not None]
         topology = Topology(topology.n_vertices, topology.edges, tuple(piece for piece, _ in found), topology.method)
         parts = [(piece.vertices, mesh.determined) for piece, mesh in found]
-        placement, said = placement.upon(topology.n_vertices, parts)
+        placement, said = placement.upon(topology, [known for _, known in parts])
         placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
         factor = np.concatenate([mesh.factor for _, mesh in found]) / placement.stretch
         scale, region = np.array([mesh.scale[0] for _, mesh in found]) / placement.stretch, None
         if any(len(mesh.scale) > 1 for _, mesh in found):
             scale, region = distinct(factor)
         mesh = joined(topology, [z for z, _ in placed], scale, placement.operator)
-        notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
+        notes = [*piece_notes([some for _, some in placed]), *topology_notes(topology)]
         status = node_status(mesh.component, parts)
         return cls(topology, [own for _, own in found], mesh, factor, region, status, [*said, *notes])
 

@@ -69,16 +69,9 @@ def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:
     differ = [
         tuple(mine[key] for key in sorted(mine, key=sorted) if key not in theirs) for mine, theirs in (rows, rows[::-1])
     ]
-    if not any(differ):  # the same sets in other orders
-        differ = [tuple(sorted(mine.values())) for mine in rows]
     reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
-    return replace(
-        one,
-        status="ambiguous",
-        uniqueness="ambiguous",
-        reason=reason,
-        alternatives=(Alternative(differ[0], differ[1]),),
-    )
+    other_cells = (Alternative(differ[0], differ[1]),)
+    return replace(one, status="ambiguous", uniqueness="ambiguous", reason=reason, alternatives=other_cells)
 
 
 def shown_cells(

@@ -133,12 +133,8 @@ def collapsed(piece: Piece, z: NDArray) -> str:
     if not np.isfinite(z).all():
         return "positions are not finite"
     d = z - z.mean()
-    if not d.any() or not _shortest(piece, z) > LAST_DIGITS:
+    shortest = np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min()
+    if not shortest > LAST_DIGITS * np.abs(d).max():
         return "points coincide"
     across = (np.exp(-0.5j * np.angle((d * d).sum())) * d).imag
     return "all points lie in a line" if np.abs(across).max() <= LAST_DIGITS * np.abs(d).max() else ""
-
-
-def _shortest(piece: Piece, z: NDArray) -> float:
-    """Length of the shortest edge, relative to the extent."""
-    return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())

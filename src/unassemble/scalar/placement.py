@@ -14,6 +14,7 @@ from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarit
 from ..planar.hinges import groups, join
 from ..reductions import ConstantTensor
 from ..topology import Piece, Topology
+from ..words import words_of
 from .notes import piece_notes, topology_notes
 
 Anchor = tuple[int, float, float]
@@ -119,46 +120,38 @@ class Placement:
 
         Returns `placed`, (k,) each; `origins` (pieces,); `notes`: what is to be said.
         """
-        origins, placed, said = self.origins(topology), [], []
+        given, notes = self.upon(topology)
+        origins, placed, said = given.origins(topology), [], []
         # Points of each piece that are fixed from outside; a direction counts as two.
-        known = np.array([2 if self._directed(p) else len(self._anchors_of(p)[0]) for p in topology.pieces])
+        known = np.array([2 if given._directed(p) else len(given._anchors_of(p)[0]) for p in topology.pieces])
         for label, piece in enumerate(topology.pieces):
-            z, more = self.apply(piece, positions[label], origins[label])
+            z, more = given.apply(piece, positions[label], origins[label])
             placed.append(z if sizes is None or known[label] >= 2 else sizes[label] * z)
             said.append((*remarks[label], *more))
-        notes = [*piece_notes(said), *self.unused(topology), *topology_notes(topology)]
+        notes = [*piece_notes(said), *notes, *topology_notes(topology)]
         return join(topology, placed, known), origins, notes
 
-    def upon(self, n: int, parts: Sequence[tuple[NDArray, NDArray]]) -> tuple[Placement, list[str]]:
-        """The same without what is known of points that are not determined, and what is to be said about that.
+    def upon(self, topology: Topology, known: Sequence[NDArray[np.bool_]] = ()) -> tuple[Placement, list[str]]:
+        """The same without what was given of points that are not determined, and what is to be said about that.
 
-        `parts`: rows (k,) of each piece, and whether each is determined there, (k,) bool.
+        `known`: whether vertices of each piece are determined, (k,) bool; all are by default.
         """
-        firm = np.ones(n, dtype=bool)
-        for rows, known in parts:
-            firm[rows[~known]] = False
+        firm, notes = topology.multiplicity > 0, []
+        for piece, own in zip(topology.pieces, known, strict=False):
+            firm[piece.vertices[~own]] = False
+        if lost := [row for row, _, _ in self.anchors if not firm[row]]:
+            notes.append(f"points of rows {words_of(lost)} are not determined: their anchors were not used")
+        direction = self.direction
+        if direction and not (firm[list(direction[:2])].all() and any(map(self._directed, topology.pieces))):
+            notes.append(
+                "`direction` joins rows of different pieces, or points that are not determined: it was not used"
+            )
+            direction = None
         anchors = tuple(anchor for anchor in self.anchors if firm[anchor[0]])
-        kept = replace(self, anchors=anchors)
-        notes = []
-        if loose := [str(row) for row, _, _ in self.anchors if not firm[row]]:
-            notes.append(f"entries do not determine the points of rows {', '.join(loose)}: their anchors were not used")
-        if self.direction and not firm[list(self.direction[:2])].all():
-            notes.append("entries do not determine the points that `direction` joins: it was not used")
-            kept = replace(kept, direction=None)
-        return kept, notes
+        return replace(self, anchors=anchors, direction=direction), notes
 
     def _directed(self, piece: Piece) -> bool:
         return self.direction is not None and bool(np.isin(self.direction[:2], piece.vertices).all())
-
-    def unused(self, topology: Topology) -> list[str]:
-        """Sentences about what was given and could not be used."""
-        notes = []
-        lost = [row for row, _, _ in self.anchors if topology.multiplicity[row] == 0]
-        if lost:
-            notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
-        if self.direction and not any(map(self._directed, topology.pieces)):
-            notes.append("`direction` joins rows of different pieces and was not used")
-        return notes
 
     def _anchors_of(self, piece: Piece) -> tuple[NDArray, NDArray]:
         """Local rows and complex targets of the anchors in a piece."""
