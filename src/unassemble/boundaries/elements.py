@@ -19,12 +19,13 @@ from ..clock import Clock
 from ..conforming.affine import expected
 from ..conforming.fit import Fitted, by_rule, corner_positions
 from ..conforming.parts import Part, parts_of
-from ..conforming.recover import JoinedParts, shown_cells
+from ..conforming.recover import joined, shown_cells
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.polish import PolishOptions, polish
 from ..recovery import ConformingMesh
+from ..scalar.held import held
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED, LITTLE, ROUNDED, SMALL
 from ..topology import Topology
@@ -88,27 +89,24 @@ def _report(
     placement, said = placement.upon(matrix.n, told)
     with clock("place"):
         placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
-        mesh = JoinedParts(topology, own, placed, placement)
+        mesh = joined(topology, own, placed, placement)
         shift = origins[mesh.component]
-        written = mesh.points + np.column_stack([shift.real, shift.imag])
+        mesh = replace(mesh, points=mesh.points + np.column_stack([shift.real, shift.imag]))
     status = node_status(mesh.component, told)
     with clock("certify"):
-        found = mesh.held(matrix, np.nan_to_num(written))
+        found = held(matrix, mesh, placement.coefficients)
         pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
         free = 1 if options.scale is None else 0
         spare = min(int((fit.used & fit.judged).sum()) - unknowns(fit.known, free) for fit in fits if fit.known.any())
-        claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
+        claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.cells.values()])
     if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None
     fields, loose = partly(status, len(pairs), error, bars=options.standard_deviations)
-    return ConformingMesh(
-        **mesh.fields(),
+    return replace(
+        mesh,
         **fields,
-        points=written,
-        hinges=topology.hinges,
-        operator=placement.operator,
         timings=clock.timings,
         warnings=(*matrix.warnings, *said, *notes, *loose),
     )

@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from ..errors import GeometryError, SolverError
 from ..linalg import UpperTriangle, factorisation
-from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
+from ..planar.conformal import conformal_map, estimate_scale
 from ..planar.cotangent import areas
 from ..topology import Piece
 from .fit import Fit, FitOptions, WholeEntries
@@ -42,7 +42,7 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
 def nearest_conformal(problem: WholeEntries, rim: Rim) -> NDArray[np.complex128]:
     """(n,) the conformal map of entries that are whole or guessed; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    c, _ = estimate_scale(problem.piece, given)
+    c = estimate_scale(problem.piece, given)
     return _conformal(problem, guessed(problem.piece, given, rim.given, c))
 
 
@@ -100,9 +100,7 @@ def _conformal(problem: WholeEntries, weights: NDArray) -> NDArray[np.complex128
     """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
     piece = problem.piece
     try:
-        z = conformal_map(
-            piece, weights, scale=problem.known_scale, sharp=False, options=ConformalOptions(max_factorisations=2)
-        ).z
+        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False, most=2).z
     except (GeometryError, SolverError):
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(areas(piece, z).mean())

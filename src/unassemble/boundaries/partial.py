@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from ..options import ScalarOptions
 from ..planar.cotangent import edge_weights
 from ..planar.piece import positions
 from ..recovery import PlanarMesh
-from ..scalar.joined import JoinedMesh
+from ..scalar.joined import joined
 from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
@@ -112,8 +112,7 @@ class _Placed:
 
     topology: Topology  # of these pieces
     meshes: list[InsideMesh]
-    positions: list[NDArray[np.complex128]]
-    mesh: JoinedMesh
+    mesh: PlanarMesh
     factor: NDArray[np.float64]  # (m,) c of each triangle
     region: NDArray[np.int64] | None  # (m,) where there are several in a piece; `mesh.scale` is that of regions then
     status: NDArray[np.int8]  # (n,) as in :class:`..recovery.Recovery`
@@ -131,11 +130,10 @@ class _Placed:
         scale, region = np.array([mesh.scale[0] for _, mesh in found]) / placement.stretch, None
         if any(len(mesh.scale) > 1 for _, mesh in found):
             scale, region = distinct(factor)
-        positions = [z for z, _ in placed]
-        joined = JoinedMesh.of(topology, positions, scale)
+        mesh = joined(topology, [z for z, _ in placed], scale, placement.operator)
         notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
-        status = node_status(joined.component, parts)
-        return cls(topology, [mesh for _, mesh in found], positions, joined, factor, region, status, [*said, *notes])
+        status = node_status(mesh.component, parts)
+        return cls(topology, [own for _, own in found], mesh, factor, region, status, [*said, *notes])
 
 
 def _report(
@@ -170,14 +168,10 @@ def _report(
         return None
     told = "" if placed.region is None else f", with a factor for each of {len(mesh.scale)} regions,"
     fields, loose = partly(status, len(pairs), error, told, bars=options.standard_deviations)
-    return PlanarMesh(
-        **mesh.fields(triangulate=placed.region is not None),
-        points=mesh.points,
+    return replace(
+        mesh,
         region=placed.region,
-        hinges=topology.hinges,
         **fields,
-        operator=placement.operator,
-        n_holes=topology.n_holes,
         timings=clock.timings,
         warnings=(*matrix.warnings, *placed.notes, *loose),
     )

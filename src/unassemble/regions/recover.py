@@ -21,7 +21,7 @@ from ..clock import Clock
 from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.conformal import ConformalOptions, conformal_map
+from ..planar.conformal import conformal_map
 from ..planar.cotangent import areas, corner_sides, edge_weights
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
@@ -168,7 +168,7 @@ def started(
         try:
             found = conformal_map(
                 piece, guessed(piece, weights / unit, whole, 1.0), scale=None, sharp=False,
-                options=ConformalOptions(max_factorisations=2),
+                most=2,
             )  # fmt: skip
         except (GeometryError, SolverError):
             break
