@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import json
-
 import networkx
 import numpy as np
 import pytest
@@ -24,12 +22,11 @@ def test_facts_of_a_mesh(c, diagonal):
     edges = edge_list(true.triangles)
     assert (facts.n_rows, facts.n_edges, facts.n_triangles) == (n, len(edges), m)
     assert (facts.n_holes, facts.n_pieces, facts.n_connected) == (2, 1, 1)
-    assert facts.n_faces - facts.n_edges + facts.n_rows == 2  # Euler
+    assert facts.n_triangles + 1 + facts.n_holes - facts.n_edges + facts.n_rows == 2  # Euler
     assert facts.n_boundary_edges == 2 * len(edges) - 3 * m
     assert facts.n_zero_sums == (0 if diagonal else n)
     assert facts.planar
     assert not facts.mixed_signs
-    assert 0.8 < facts.scale[0] / c < 1.25
     assert facts.operator == "laplacian, linear triangles" + (", plus a diagonal" if diagonal else "")
     assert facts.recoverable.startswith(f"{m:,} triangles on {n:,} points, up to position")
 
@@ -78,9 +75,8 @@ def test_cells_that_the_graph_does_not_show(name):
     assert (facts.n_vanished_sides, facts.n_holes, facts.n_pieces) == (n_vanished_sides, n_holes, 1)
     assert facts.n_boundary_edges == len(found.boundary)
     n_edges = facts.n_edges + facts.n_vanished_sides
-    assert facts.n_faces - n_edges + facts.n_rows == 2  # Euler
+    assert n_triangles + n_polygons + 1 + n_holes - n_edges + facts.n_rows == 2  # Euler
     assert (facts.n_bare_edges, facts.n_undetermined) == (0, 0)
-    assert 1 < facts.scale[0] < 4
     assert facts.recoverable.startswith("likely ")
     assert f"{n_polygons:,} cells of more than three vertices" in str(facts)
     assert "read from the entries" in str(facts)
@@ -120,15 +116,6 @@ def test_signs_that_no_laplacian_has():
     assert facts.mixed_signs == (0,)
     assert "look at row 0" in facts.recoverable
     assert "not a Laplacian" in facts.operator
-    assert "other sign in row 0" in str(facts)
-
-
-def test_entries_that_add_up_to_zero_give_no_estimate():
-    A = np.array([[0, 1.0, 1.0], [1.0, 0, -2.0], [1.0, -2.0, 0]])
-    facts = inspect_matrix(A)
-    assert np.isnan(facts.scale).all()
-    assert "cannot be estimated" in str(facts)
-    assert json.loads(json.dumps(facts.to_dict(), allow_nan=False))["scale"] == [None]
 
 
 def test_pieces_hinges_loose_rows_and_bare_edges():

@@ -6,7 +6,7 @@ from pathlib import Path
 import scipy.io
 
 from unassemble import PlanarMesh, Recovery, recover
-from unassemble.files import made_folder, whole_file
+from unassemble.files import whole_file
 from unassemble.report import write_report
 from unassemble.summary import summary
 
@@ -21,9 +21,10 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
 
     It is made where it does not exist. What there is to say goes to `echo`, line by line or in blocks.
 
-    Raises InputError if a package that meshes or assembles is not installed, or the folder cannot be written into.
+    Raises InputError if a package that meshes or assembles is not installed; OSError if the folder cannot be made.
     """
-    folder = made_folder(folder)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     recoveries = []
     for specimen in (unit_square(), lake(), mast()):
         file = folder / f"{specimen.name}.mtx"

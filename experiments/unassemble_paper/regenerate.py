@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
 
-from unassemble.files import made_folder
-
 from .cases import Case, Direct, cases
 from .claim import Claim, claims_table
 from .claims import iteration_claims
@@ -98,7 +96,8 @@ def regenerate(directory: str | PathLike[str], direct: Direct, *, longer: bool =
     """
     from . import figures  # drawing is not needed to measure
 
-    folder = made_folder(directory)
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
     measured = measure(direct)
     tables = [*measured.tables]
     for name, experiment in LONGER.items() if longer else ():

@@ -32,20 +32,6 @@ def whole_file(path: str | os.PathLike[str], suffix: str) -> Iterator[Path]:
         raise OutputError(f"cannot write {os.fspath(path)!r}: {_reason(error)}") from error
 
 
-def made_folder(path: str | os.PathLike[str]) -> Path:
-    """A folder to write into, made where it does not exist; raises OutputError where it cannot be."""
-    name, folder = os.fspath(path), Path(path)
-    try:
-        if folder.exists() and not folder.is_dir():
-            raise OutputError(f"cannot write into {name!r}: it is a file, and a folder is needed")
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=_DRAFT, dir=folder):
-            pass  # permissions are best judged by trying
-    except (OSError, ValueError, RuntimeError) as error:
-        raise OutputError(f"cannot make the folder {name!r}, or write into it: {_reason(error)}") from error
-    return folder
-
-
 def check_target(path: str | os.PathLike[str]) -> None:
     """Raise OutputError, before long work, where a file cannot be written.
 

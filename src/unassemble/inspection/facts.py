@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
 from ..conforming.recover import shown_cells
-from ..errors import GeometryError, RecoveryError, TopologyError
+from ..errors import RecoveryError, TopologyError
 from ..masses import less_mass
 from ..matrix import OperatorMatrix
 from ..metric.mesh import SurfaceMesh
 from ..nodes.nodal import nodal_matrix, uncoupled
 from ..operators import VectorReading
-from ..planar.conformal import estimate_scale
 from ..recovery import ELEMENT_NAMES
 from ..structures import StructuralNumbering
 from ..structures.trusses import bars_of
@@ -85,10 +84,9 @@ def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
     pieces = topology.pieces
     polygons = topology.polygons
     n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
-    estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
+    signs = [_of_other_sign(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
     return {
         "n_triangles": n_triangles,
-        "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
         "n_holes": topology.n_holes,
         "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
         "n_pieces": len(pieces),
@@ -98,21 +96,15 @@ def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
         "n_polygons": polygons.count,
         "n_vanished_sides": len(topology.vanished) - int((polygons.size - 3).sum()),
         "cells_from": "entries" if len(topology.vanished) else "graph",
-        "scale": np.array([scale for scale, _ in estimates]),
-        "mixed_signs": tuple(row for _, row in estimates if row is not None),
+        "mixed_signs": tuple(row for rows in signs for row in rows),
     }
 
 
-def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
-    """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
-    try:
-        scale = estimate_scale(piece, weights)[0]
-    except GeometryError:
-        scale = np.nan
+def _of_other_sign(piece: Piece, weights: NDArray) -> list[int]:
+    """The first row in which c has another sign than in most: c L_ii is the sum of a row's weights, and L_ii > 0."""
     sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)
     positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
-    other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
-    return scale, int(piece.vertices[other[0]]) if len(other) else None
+    return piece.vertices[sums <= 0 if positive else sums >= 0][:1].tolist()
 
 
 def surface_facts(matrix: OperatorMatrix) -> dict[str, Any]:

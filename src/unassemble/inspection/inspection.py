@@ -1,10 +1,7 @@
 """Facts about a matrix, and what follows from them."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..diagnosis import PLANAR
 from ..words import count_of
@@ -30,14 +27,12 @@ class Inspection:
     planar: bool = True  #: Whether the graph is that of a planar mesh, as far as that is known.
     obstacle: str = ""  #: Why no mesh is recognised; empty where one is.
     n_triangles: int = 0  #: Triangles among the cells.
-    n_faces: int = 0  #: All cells, and the regions between boundary loops.
-    n_holes: int = 0  #: Bounded ones of these regions.
+    n_holes: int = 0  #: Bounded boundary loops.
     n_boundary_edges: int = 0  #: Edges on the boundary.
     n_pieces: int = 0  #: Edge-connected ones.
     n_hinges: int = 0  #: Vertices that join them.
     n_bare_edges: int = 0  #: Edges of no cell.
     n_undetermined: int = 0  #: Rows of no cell.
-    scale: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))  #: (n_pieces,) c, to some ten per cent.
     #: Rows, the first in each piece, in which c would have the other sign than in most.
     mixed_signs: tuple[int, ...] = ()
     block_size: int = 1  #: Unknowns per node, 1 for a scalar matrix.
@@ -125,9 +120,7 @@ class Inspection:
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes, ready for JSON."""
-        content: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
-        content["scale"] = [c if np.isfinite(c) else None for c in self.scale.tolist()]
-        return content | {"operator": self.operator, "recoverable": self.recoverable}
+        return asdict(self) | {"operator": self.operator, "recoverable": self.recoverable}
 
     def __str__(self) -> str:
         return "\n".join(f"{name:<13} {value}" for name, value in lines_of(self))

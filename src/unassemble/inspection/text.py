@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..tolerances import ROUNDED
 from ..words import count_of
 
@@ -42,9 +40,8 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
     elif not facts.obstacle:
         left_over = {"edge": facts.n_bare_edges, "row": facts.n_undetermined}
         more = [f"; {count_of(count, one)} of no cell" for one, count in left_over.items() if count]
-        faces, sides = count_of(facts.n_faces, "face"), count_of(facts.n_boundary_edges, "boundary edge")
-        mesh = "".join([f"{mesh_text(facts)}, {faces} with the outside and the holes, {sides}", *more])
-        lines += [("mesh", mesh), ("cells", _cells(facts)), *holes, ("scale c", _scale(facts))]
+        mesh = "".join([f"{mesh_text(facts)}, {count_of(facts.n_boundary_edges, 'boundary edge')}", *more])
+        lines += [("mesh", mesh), ("cells", _cells(facts)), *holes]
     lines.append(("operator", facts.operator))
     lines += [("evidence", one) for one in facts.evidence]
     lines.append(("recoverable", facts.recoverable))
@@ -86,14 +83,3 @@ def _cells(facts: Inspection) -> str:
         gone.append(f"{count_of(facts.n_vanished_sides, 'side')} of the boundary, facing right angles")
     vanished = f"; no entry on {' and on '.join(gone)}" if gone else ""
     return f"read from the entries, since the graph does not settle them{vanished}; recovery begins with these"
-
-
-def _scale(facts: Inspection) -> str:
-    known = facts.scale[np.isfinite(facts.scale)]
-    if not len(known):
-        return "cannot be estimated: the entries add up to zero"
-    low, high = float(known.min()), float(known.max())
-    about = f"about {low:.2g}" if high - low <= 0.1 * abs(low) else f"about {low:.2g} to {high:.2g}"
-    if facts.mixed_signs:
-        return f"{about}, but of the other sign in row {facts.mixed_signs[0]}"
-    return f"{about}, of one sign in every row" + (" of a piece" if facts.n_pieces > 1 else "")
