@@ -182,12 +182,9 @@ def test_at_the_command_line(tmp_path, monkeypatch):
 
 
 def test_a_mass_term_in_the_matrix_itself():
-    K, M, true = scalar(moved(LAKE), density=1.0)
-    found = recover(K - 0.7 * M, mass=M)
-    assert found.certified
-    assert found.reaction == pytest.approx(-0.7, rel=1e-9)
-    assert any("sqrt(-0.7 / s)" in note for note in found.warnings)
-    np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-9)
+    K, M, _ = scalar(moved(LAKE), density=1.0)
+    with pytest.raises(RecoveryError, match="a mass term of its own"):
+        recover(K - 0.7 * M, mass=M)
 
 
 def test_one_anchor_tells_no_size():
@@ -200,7 +197,7 @@ def test_one_anchor_tells_no_size():
 
 def test_areas_are_held_against_no_mass():
     M = scalar(moved(LAKE))[1]
-    with pytest.raises(RecoveryError, match="held against"):
+    with pytest.raises(RecoveryError, match="a mass term of its own"):
         recover(M, mass=M)
 
 

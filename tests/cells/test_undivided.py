@@ -7,7 +7,7 @@ import numpy as np
 from meshes import specimen
 from unassemble import recover
 from unassemble.cells import undivided
-from unassemble.scalar import JoinedMesh
+from unassemble.scalar import joined
 from unassemble.topology import surfaces
 from vanishing import forgotten, squares
 
@@ -54,5 +54,5 @@ def test_cells_without_an_outline_are_written_as_triangles():
     assert len(lone) == 12
     assert not polygons.count
     z = np.exp(2j * np.pi * np.arange(12) / 6) * np.repeat([2, 1], 6)
-    mesh = JoinedMesh.of(replace(topology, vanished=piece.edge_rows[vanished]), [z[piece.vertices]], np.ones(1))
-    assert len(mesh.triangles[~mesh.in_polygon]) == 12
+    mesh = joined(replace(topology, vanished=piece.edge_rows[vanished]), [z[piece.vertices]], np.ones(1), "")
+    assert len(mesh.triangles) == 12

@@ -46,7 +46,7 @@ BAD = [
     (["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1"], "--handed"),
     (
         ["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1", "--anchor", "2,3,3"],
-        "anchors in line leave the mirror image open",
+        "the mirror image is open",
     ),
     (["--handed", "left"], "needs a line"),
     (["--handed", "up", "--direction", "0,1,30"], "'up'"),

@@ -171,7 +171,7 @@ def test_sparse_objects(refused) -> None:
 def test_coordinates_of_different_lengths(refused) -> None:
     A = sp.coo_array(PATH)
     A.data = A.data[:-1]
-    refused(MatrixError, ("damaged", "7 row indices", "6 values"), check_matrix, A)
+    refused(MatrixError, ("damaged", "length"), check_matrix, A)
 
 
 def test_real_part_of_complex_matrices() -> None:
@@ -274,26 +274,26 @@ def test_far_more_rows_than_entries(storage: str, refused) -> None:
 
 
 @pytest.mark.parametrize(
-    ("attribute", "value", "words"),
+    ("attribute", "value"),
     [
-        ("indices", [0, 1, 0, 1, 2, 1, 9], "column index 9"),
-        ("indices", [0, 1, 0, 1, 2, -1, 2], "column index -1"),
-        ("indptr", [0, 5, 2, 7], "index pointer"),
-        ("indptr", [0, 2, 5, 70], "announces 70"),
-        ("indptr", [1, 2, 5, 7], "index pointer"),
-        ("indptr", [0, 2, 7], "index pointer"),
+        ("indices", [0, 1, 0, 1, 2, 1, 9]),
+        ("indices", [0, 1, 0, 1, 2, -1, 2]),
+        ("indptr", [0, 5, 2, 7]),
+        ("indptr", [0, 2, 5, 70]),
+        ("indptr", [1, 2, 5, 7]),
+        ("indptr", [0, 2, 7]),
     ],
 )
-def test_index_arrays_that_would_crash(attribute: str, value: list[int], words: str, refused) -> None:
+def test_index_arrays_that_would_crash(attribute: str, value: list[int], refused) -> None:
     A = sp.csr_array(PATH)
     setattr(A, attribute, np.array(value, dtype=np.int32))
-    refused(MatrixError, ("damaged", words), check_matrix, A)
+    refused(MatrixError, "damaged", check_matrix, A)
 
 
 def test_coordinates_that_would_crash(refused) -> None:
     A = sp.coo_array(PATH)
     A.row[3] = 77
-    refused(MatrixError, ("damaged", "row index 77"), check_matrix, A)
+    refused(MatrixError, ("damaged", "77"), check_matrix, A)
 
 
 @given(st.permutations(range(5)), st.integers(0, 2**32 - 1))

@@ -19,12 +19,13 @@ from ..clock import Clock
 from ..conforming.affine import expected
 from ..conforming.fit import Fitted, by_rule, corner_positions
 from ..conforming.parts import Part, parts_of
-from ..conforming.recover import JoinedParts, shown_cells
+from ..conforming.recover import joined, shown_cells
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.polish import PolishOptions, polish
 from ..recovery import ConformingMesh
+from ..scalar.held import held
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, LITTLE, ROUNDED, SMALL
 from ..topology import Topology
@@ -88,25 +89,22 @@ def _report(
     placement, said = placement.upon(matrix.n, told)
     with clock("place"):
         placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
-        mesh = JoinedParts(topology, own, placed, placement)
+        mesh = joined(topology, own, placed, placement)
         shift = origins[mesh.component]
-        written = mesh.points + np.column_stack([shift.real, shift.imag])
+        mesh = replace(mesh, points=mesh.points + np.column_stack([shift.real, shift.imag]))
     status = node_status(mesh.component, told)
     with clock("certify"):
         pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
         spare = min(fit.spare for fit in fits if fit.known.any())
-        claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
-        held = mesh.held(matrix, np.nan_to_num(written))
-        verdict = partly(status, held, claimed, pairs, spare, bars=options.standard_deviations)
+        claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.cells.values()])
+        found = held(matrix, mesh, placement.coefficients)
+        verdict = partly(status, found, claimed, pairs, spare, bars=options.standard_deviations)
     if verdict is None:
         return None
     fields, loose = verdict
-    return ConformingMesh(
-        **mesh.fields(),
+    return replace(
+        mesh,
         **fields,
-        points=written,
-        hinges=topology.hinges,
-        operator=placement.operator,
         timings=clock.timings,
         warnings=(*matrix.warnings, *said, *notes, *loose),
     )

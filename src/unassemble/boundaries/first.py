@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from ..errors import GeometryError, SolverError
 from ..linalg import solved
-from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
+from ..planar.conformal import conformal_map, estimate_scale
 from ..planar.cotangent import areas
 from ..topology import Piece
 from .fit import Fit, FitOptions, WholeEntries
@@ -45,7 +45,7 @@ def nearest_conformal(
 ) -> NDArray[np.complex128]:
     """(n,) the conformal map of entries that are whole or guessed, at random if so; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given)[0])
+    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
     if rng is not None:
         weights = np.where(rim.given, weights, weights * rng.lognormal(sigma=0.6, size=len(weights)))
     return conformal(problem.piece, weights, None if problem.known_scale is None else float(problem.known_scale[0]))
@@ -54,7 +54,7 @@ def nearest_conformal(
 def conformal(piece: Piece, weights: NDArray, scale: float | None) -> NDArray[np.complex128]:
     """(n,) the conformal map of weights (e,), its triangles of mean area 1/2; 0 where there is none."""
     try:
-        z = conformal_map(piece, weights, scale=scale, sharp=False, options=ConformalOptions(max_factorisations=2)).z
+        z = conformal_map(piece, weights, scale=scale, sharp=False, most=2).z
     except (GeometryError, SolverError):
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(areas(piece, z).mean())

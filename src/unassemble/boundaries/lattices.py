@@ -1,5 +1,7 @@
 """Scalar matrices that are a part of a grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import ConformingMesh, PlanarMesh
-from ..scalar.joined import JoinedMesh
+from ..scalar.joined import joined
 from ..scalar.notes import vanished_notes
 from ..scalar.placement import Placement
 from ..tolerances import CERTIFIED
@@ -58,7 +60,7 @@ def recover_lattice(
         z = np.full(n + int((row >= n).sum()), np.nan, dtype=np.complex128)
         z[row] = (lattice.z - lattice.z.mean()) / np.ptp(lattice.z.real)  # of size one: else digits are lost below
         placed, notes = placement.apply(piece, z[piece.vertices])
-        mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / placement.stretch]))
+        mesh = joined(topology, [placed], np.array([lattice.scale / placement.stretch]), placement.operator)
         affine = np.column_stack([z, np.conj(z), np.ones(len(z))])
         gone = affine[n:] @ np.linalg.lstsq(affine[piece.vertices], placed, rcond=None)[0]
     with clock("certify"):
@@ -68,15 +70,14 @@ def recover_lattice(
         error = _backward_error(matrix, own, tensor.to_laplacian(points) if tensor else points, cells, lattice)
     if not error <= CERTIFIED:
         return None
-    kind: type[PlanarMesh] = PlanarMesh
-    fields = mesh.fields(triangulate=options.triangulate)
+    if options.triangulate:
+        mesh = mesh.triangulated()
     if lattice.bilinear:
-        kind, quads = ConformingMesh, cells[(cells < n).all(axis=1)]
-        fields |= {"triangles": quads[:0, :3], "quads": quads, "quadrature": _RULES["quad"], "straight": True}
-    return kind(
-        **fields,
-        points=mesh.points,
-        hinges=topology.hinges,
+        quads = cells[(cells < n).all(axis=1)]
+        more = {"triangles": quads[:0, :3], "quads": quads, "quadrature": _RULES["quad"], "straight": True}
+        mesh = ConformingMesh(**(vars(mesh) | more))
+    return replace(
+        mesh,
         node_status=status,
         status="ambiguous" if lattice.like_mass else "certified",
         uniqueness="ambiguous",
@@ -84,9 +85,7 @@ def recover_lattice(
             f"the grid, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
             f"the matrix back to {error:.1e} (relative), row sums included"
         ),
-        operator=placement.operator,
         backward_error=error,
-        n_holes=topology.n_holes,
         timings=clock.timings,
         warnings=(*matrix.warnings, *_notes(lattice, status), *loose, *notes, *vanished_notes(topology)),
         eliminated_points=np.column_stack([gone.real, gone.imag]),

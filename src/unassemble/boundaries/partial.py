@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ..options import ScalarOptions
 from ..planar.cotangent import edge_weights
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
-from ..scalar.joined import JoinedMesh
+from ..scalar.joined import joined
 from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
@@ -74,13 +75,13 @@ def recover_partial(
         if any(len(mesh.scale) > 1 for _, mesh in found):
             c, region = distinct(factor)
             told = f", with a factor for each of {len(c)} regions,"
-        joined = JoinedMesh.of(topology, [z for z, _ in placed], c)
-        status = node_status(joined.component, parts)
+        result = joined(topology, [z for z, _ in placed], c, placement.operator)
+        status = node_status(result.component, parts)
         notes = [*said, *piece_notes([some for _, some in placed])]
         notes += [*placement.unused(topology), *topology_notes(topology)]
     with clock("certify"):
-        points = np.nan_to_num(joined.points)
-        on = {"triangle": joined.triangles}, {"triangle": factor}
+        points = np.nan_to_num(result.points)
+        on = {"triangle": result.triangles}, {"triangle": factor}
         held = certify(matrix.edges, matrix.entries, points, *on, tensor=placement.coefficients)
         rows, spare = [], []
         for piece, mesh in found:
@@ -89,7 +90,7 @@ def recover_partial(
                 factors = 0 if options.scale is not None else len(mesh.scale)
                 spare.append(int(mesh.entries.sum()) - unknowns(mesh.determined, factors))
         pairs = matrix.edges[np.concatenate(rows)]
-        claimed = (status[joined.triangles] == 0).all(axis=1)
+        claimed = (status[result.triangles] == 0).all(axis=1)
         verdict = partly(status, held, claimed, pairs, min(spare), told, bars=options.standard_deviations)
         sums = matrix.row_sums.copy()
         for end in held.pairs.T:
@@ -98,14 +99,10 @@ def recover_partial(
     if verdict is None or (len(pairs) < len(matrix.edges) and not gone.any()):
         return None
     fields, loose = verdict
-    return PlanarMesh(
-        **joined.fields(triangulate=region is not None),
-        points=joined.points,
+    return replace(
+        result,
         region=region,
-        hinges=topology.hinges,
         **fields,
-        operator=placement.operator,
-        n_holes=topology.n_holes,
         timings=clock.timings,
         warnings=(*matrix.warnings, *notes, *loose),
     )

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ..budget import AT_ONCE
 from ..elements.kinds import Kind
 from ..elements.reference import Rule, shape_gradients
+from ..planar.normal import Jacobian
 from .parts import Part
 
 _CELLS = AT_ONCE // 1024  # few enough for the cache: a cell has about a hundred numbers at a time
@@ -72,9 +73,26 @@ class Entries:
         z = self.nodes(z)
         return np.concatenate([at.determinant.ravel() for block in self._blocks for _, at in block.parts(z)])
 
-    def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
-        """The derivative at z."""
-        return EntriesJacobian(self._blocks, self.nodes(z), self.n, spread)
+    def jacobian(self, z: NDArray, spread: NDArray) -> Jacobian:
+        """dw / d(x, y) at z."""
+        total, z = sp.csr_array((len(spread), self.n), dtype=np.complex128), self.nodes(z)
+        for block in self._blocks:
+            rows, columns, values = [], [], []
+            for some, at in block.parts(z):
+                squares, (along_p, along_r) = at.squares(), at.gradient()
+                value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
+                for k in range(value.shape[2]):
+                    g = along_p * block.slopes[0][:, k] + along_r * block.slopes[1][:, k]
+                    value[:, :, k].real = block.products(*(_real(g, one) for one in squares))
+                    value[:, :, k].imag = block.products(*(_real(-1j * g, one) for one in squares))
+                row = np.broadcast_to(block.places[some][:, :, None], value.shape)
+                rows.append(row.astype(np.int32).ravel())
+                columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
+                values.append((value / spread[row]).ravel())
+            place = np.concatenate(rows), np.concatenate(columns)
+            total = total + sp.coo_array((np.concatenate(values), place), shape=total.shape).tocsr()
+        data = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]
+        return Jacobian(sp.bsr_array((data, total.indices, total.indptr), shape=(len(spread), 2 * self.n)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,39 +156,6 @@ class _Block:
     def squares(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
         """(m, k) the same for pairs of a node with itself."""
         return first @ self._p**2 + mixed @ (2 * self._p * self._r) + last @ self._r**2
-
-
-class EntriesJacobian:
-    """dw / d(x, y); a :class:`~unassemble.planar.normal.Jacobian`."""
-
-    def __init__(self, blocks: list[_Block], z: NDArray, n: int, spread: NDArray):
-        self.n, self.spread = n, spread
-        total = sp.csr_array((len(spread), n), dtype=np.complex128)
-        for block in blocks:
-            rows, columns, values = [], [], []
-            for some, at in block.parts(z):
-                squares, (along_p, along_r) = at.squares(), at.gradient()
-                value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
-                for k in range(value.shape[2]):
-                    g = along_p * block.slopes[0][:, k] + along_r * block.slopes[1][:, k]
-                    value[:, :, k].real = block.products(*(_real(g, one) for one in squares))
-                    value[:, :, k].imag = block.products(*(_real(-1j * g, one) for one in squares))
-                row = np.broadcast_to(block.places[some][:, :, None], value.shape)
-                rows.append(row.astype(np.int32).ravel())
-                columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
-                values.append((value / spread[row]).ravel())
-            place = np.concatenate(rows), np.concatenate(columns)
-            total = total + sp.coo_array((np.concatenate(values), place), shape=total.shape).tocsr()
-        data = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]
-        self.matrix = sp.bsr_array((data, total.indices, total.indptr), shape=(len(spread), 2 * n))
-
-    def forward(self, displacement: NDArray) -> NDArray:
-        """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
-        return np.asarray(self.matrix @ np.ascontiguousarray(displacement.T).view(np.float64).T)
-
-    def transpose(self, change: NDArray) -> NDArray:
-        """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
-        return np.asarray(self.matrix.T @ change).view(np.complex128)
 
 
 def _total(n: int, sums: Iterable[tuple[_Block, list[NDArray]]]) -> NDArray[np.float64]:

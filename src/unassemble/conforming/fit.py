@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..elements.reference import planar_rules
 from ..errors import GeometryError
-from ..planar.conformal import ConformalOptions, conformal_map
+from ..planar.conformal import conformal_map
 from ..planar.piece import PieceMesh, refined
 from ..planar.polish import count_flipped
 from ..scalar.solving import Task
@@ -153,7 +153,6 @@ def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple
     if not unit:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     # Half the energy alone is definite, and from there the cluster of holomorphic maps is seen as one.
-    options = ConformalOptions(first_shift=0.0)
     corners = replace(part.piece, vertices=part.piece.vertices[: part.n_corners], edges=edges)
-    found = conformal_map(corners, weights, scale=scale, unit=unit, options=options)
+    found = conformal_map(corners, weights, scale=scale, unit=unit, first_shift=0.0)
     return found.z, found.scale

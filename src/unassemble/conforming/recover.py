@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..certify import Certificate, certify
 from ..clock import Clock
 from ..elements.surface import fields_of
 from ..errors import GeometryError, SolverError, TopologyError
@@ -22,7 +20,6 @@ from ..scalar.noise import Noise, with_vanished
 from ..scalar.placement import Placement
 from ..scalar.recover import finished, small
 from ..scalar.solving import Solved, Task
-from ..scalar.verdict import Drawn
 from ..topology import Topology, local_numbering
 from ..topology.keys import distinct, pair_keys
 from .fit import Fitted, fitted
@@ -112,23 +109,13 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         own = [piece.edge_rows for piece in topology.pieces]
         fits = [fitted(part, -matrix.entries[o], errors[o], task) for part, o in zip(parts, own, strict=True)]
     spare = np.array([fit.freedom for fit in fits])
-    least = np.array([piece.vertices.min() for piece in topology.pieces])
+    models, uniqueness = [fit.entries for fit in fits], "proved" if cells.told else "searched"
 
-    def drawn(placed: list[NDArray]) -> Drawn:
-        mesh = JoinedParts(topology, fits, placed, task.placement)
-        uniqueness = "proved" if cells.told else "searched"
-        return Drawn(
-            mesh.points,
-            list(mesh.blocks.values()),
-            lambda points: mesh.held(stored, points),
-            lambda: least[spare + (task.scale is not None) <= 0],
-            lambda _: ([], uniqueness),
-            ConformingMesh,
-            mesh.fields(),
-        )
+    def drawn(placed: list[NDArray]) -> PlanarMesh:
+        return joined(topology, fits, placed, task.placement)
 
-    models = [fit.entries for fit in fits]
-    return finished(Solved(stored, matrix, topology, fits, models, spare, task.noise), drawn, (), clock, task)
+    solved = Solved(stored, matrix, topology, fits, models, spare, task, task.noise)
+    return finished(solved, drawn, lambda _: ([], uniqueness), (), clock)
 
 
 def _with_zeros(stored: OperatorMatrix, parts: Sequence[Part]) -> tuple[OperatorMatrix, Topology]:
@@ -145,42 +132,27 @@ def _with_zeros(stored: OperatorMatrix, parts: Sequence[Part]) -> tuple[Operator
     return replace(stored, edges=edges, entries=entries), Topology(n, edges, pieces, "cliques", vanished=vanished)
 
 
-class JoinedParts:
-    """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
-
-    def __init__(
-        self, topology: Topology, fits: Sequence[Fitted], placed: Sequence[NDArray[np.complex128]], placement: Placement
-    ):
-        """Parts are the pieces of the topology, at positions `placed`."""
-        self.points = np.full((topology.n_vertices, 2), np.nan)
-        self.component = topology.component
-        self.blocks: dict[str, NDArray[np.int64]] = {}
-        self._piece: dict[str, NDArray[np.int64]] = {}  # of each cell
-        self._fits, self._placement = fits, placement
-        for label in range(len(fits))[::-1]:  # the first part at a hinge comes last
-            part, z = fits[label].part, placed[label]
-            self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
-            a, b, c = z[part.piece.triangles].T
-            mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
-            for kind, cells in part.blocks.items():
-                own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
-                piece, name = np.full(len(own), label), kind.name
-                self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
-                self._piece[name] = np.concatenate([piece, self._piece.get(name, piece[:0])])
-
-    def held(self, matrix: OperatorMatrix, points: NDArray) -> Certificate:
-        """The mesh with these points against the matrix."""
-        scale = np.array([fit.scale for fit in self._fits]) / self._placement.stretch
-        factors, given = {name: scale[piece] for name, piece in self._piece.items()}, (matrix.edges, matrix.entries)
-        rules = {name: rule for fit in self._fits for name, rule in fit.rule.items()}
-        return certify(*given, points, self.blocks, factors, rules=rules, tensor=self._placement.coefficients)
-
-    def fields(self) -> dict[str, Any]:
-        """What results say of the mesh, under the names that they have for it."""
-        return fields_of(self.blocks) | {
-            "component": self.component,
-            "scale": np.array([fit.scale for fit in self._fits]) / self._placement.stretch,
-            "n_holes": sum(fit.part.n_holes for fit in self._fits),
-            "quadrature": ", ".join(dict.fromkeys(rule for fit in self._fits for rule in fit.rule.values())),
-            "straight": all(fit.straight for fit in self._fits),
-        }
+def joined(
+    topology: Topology, fits: Sequence[Fitted], placed: Sequence[NDArray[np.complex128]], placement: Placement
+) -> ConformingMesh:
+    """Parts, pieces of the topology, put together at positions `placed`, those that are mirrored turned over."""
+    points = np.full((topology.n_vertices, 2), np.nan)
+    blocks: dict[str, NDArray[np.int64]] = {}
+    for fit, z in list(zip(fits, placed, strict=True))[::-1]:  # the first part at a hinge comes last
+        vertices, (a, b, c) = fit.part.piece.vertices, z[fit.part.piece.triangles].T
+        points[vertices] = np.column_stack([z.real, z.imag])
+        mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
+        for kind, cells in fit.part.blocks.items():
+            own = vertices[cells[:, reversal(kind)] if mirrored else cells]
+            blocks[kind.name] = np.concatenate([own, blocks.get(kind.name, own[:0])])
+    return ConformingMesh(
+        **fields_of(blocks),
+        points=points,
+        hinges=topology.hinges,
+        operator=placement.operator,
+        component=topology.component,
+        scale=np.array([fit.scale for fit in fits]) / placement.stretch,
+        n_holes=sum(fit.part.n_holes for fit in fits),
+        quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
+        straight=all(fit.straight for fit in fits),
+    )

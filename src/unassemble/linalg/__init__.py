@@ -2,7 +2,6 @@
 
 from .definite import nearly_singular, solved, svd
 from .factorisation import Factorisation, backend, blas_threads, factorisation, threads
-from .least_norm import least_norm
 from .responses import SamplingOptions
 from .upper import UpperTriangle, upper_from_edges
 
@@ -13,7 +12,6 @@ __all__ = [
     "backend",
     "blas_threads",
     "factorisation",
-    "least_norm",
     "nearly_singular",
     "solved",
     "svd",

@@ -56,6 +56,8 @@ def weighed(
     if not found.certified:
         note = "the mass matrix was not looked at, for the mesh is not certified"
         return replace(found, warnings=(*found.warnings, note))
+    if found.reaction:
+        raise GeometryError("the matrix has a mass term of its own: give the stiffness matrix alone beside `mass`")
     lumped = M.count_nonzero() == M.shape[0]
     unit = _assembled(found, lumped).diagonal()
     whole = _whole(A, found) & (unit > 0)  # nodes beside supports may be in no cell
@@ -147,8 +149,6 @@ def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.fl
         raise GeometryError(
             "pieces that meet in single vertices are of different sizes, by `mass`: that is not read yet"
         )
-    if found.reaction:  # which all pieces share
-        times = np.full_like(times, times[0])
     of_node = np.where(found.component < 0, np.nan, times[found.component])[:, None]
     more: dict[str, Any] = {}
     if isinstance(found, PlanarMesh):
@@ -156,10 +156,6 @@ def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.fl
             more["standard_deviations"] = found.standard_deviations * of_node
         if len(found.eliminated_points):
             more["eliminated_points"] = centre + (found.eliminated_points - centre) * times[0]
-        if found.reaction:
-            more["reaction"] = found.reaction / times[0] ** found.dim
-            old, new = (f"{one:.12g}" for one in (found.reaction, more["reaction"]))
-            more["warnings"] = tuple(note.replace(old, new) for note in found.warnings)
     if isinstance(found, Body):
         more["scale"] = found.scale / times ** (found.dim - 2)
         if len(found.lame):  # of few digits, cells without moduli

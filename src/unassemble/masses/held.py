@@ -7,9 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Certificate, Terms, certify
+from ..certify import Terms
 from ..matrix import OperatorMatrix
-from ..recovery import ConformingMesh, PlanarMesh
+from ..recovery import PlanarMesh
+from ..scalar.held import held
 from ..tolerances import CERTIFIED, SIGMAS
 
 Plain = Callable[..., PlanarMesh]
@@ -19,7 +20,7 @@ Plain = Callable[..., PlanarMesh]
 class Held:
     """A matrix, its row sums, of which c L has none and s M the integrals of s times its basis functions, and a tensor.
 
-    `tensor`: (kxx, kxy, kyy), to be undone.
+    `tensor`: (kxx, kxy, kyy) to be undone.
     """
 
     matrix: OperatorMatrix
@@ -53,10 +54,12 @@ class Held:
                 f"sqrt({terms.reaction:.12g} / s)",
                 *notes,
             )
-        held = self._certificate(found, terms)
-        good = held.backward_error <= CERTIFIED and not len(held.flipped)
-        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e} (relative)"
-        worst, misfits = held.worst(0 if good and found.certified else 10)
+        certificate = held(self.matrix, found, self.tensor, terms)
+        good = certificate.backward_error <= CERTIFIED and not len(certificate.flipped)
+        fits = (
+            f"{operator} re-assembled on this mesh gives the matrix back to {certificate.backward_error:.1e} (relative)"
+        )
+        worst, misfits = certificate.worst(0 if good and found.certified else 10)
         return replace(
             found,
             reaction=terms.reaction,
@@ -64,25 +67,8 @@ class Held:
             status=found.status if good else "uncertified",
             uniqueness=found.uniqueness if good else None,
             reason=fits if good and found.certified else f"{fits}, but {found.reason}" if good else f"{fits} only",
-            backward_error=held.backward_error,
+            backward_error=certificate.backward_error,
             warnings=(*found.warnings, *notes),
             worst_entries=worst,
             worst_misfits=misfits,
         )
-
-    def _certificate(self, found: PlanarMesh, terms: Terms) -> Certificate:
-        def factor(cells: NDArray) -> NDArray:
-            return found.scale[found.component[cells].max(axis=1)]  # a hinge carries the lowest label
-
-        given = self.matrix.edges, self.matrix.entries, found.points
-        if not isinstance(found, ConformingMesh):
-            triangles = found.divided()[0]
-            return certify(
-                *given, {"triangle": triangles}, {"triangle": factor(triangles)}, tensor=self.tensor, terms=terms
-            )
-        rules = {
-            name: next(rule for rule in found.quadrature.split(", ") if ("Gauss" in rule) == name.startswith("quad"))
-            for name in found.cells
-        }
-        factors = {name: factor(cells) for name, cells in found.cells.items()}
-        return certify(*given, found.cells, factors, rules=rules, terms=terms)

@@ -95,34 +95,17 @@ def place(csr: sp.csr_array, k: int) -> tuple[int, int]:
 
 
 def inconsistency(A: Any) -> str | None:
-    """What is wrong with the index arrays, in words; None where nothing is.
+    """What is wrong with the index arrays, in scipy's words; None where nothing is.
 
     Compiled code trusts these arrays: a wrong one reads or writes outside its memory.
     """
-    rows, columns = A.shape
-    if A.format == "coo":
-        if not len(A.row) == len(A.col) == len(A.data):
-            return f"it has {len(A.row)} row indices, {len(A.col)} column indices and {len(A.data)} values"
-        return _outside(A.row, rows, "row") or _outside(A.col, columns, "column")
-    if A.format not in ("csr", "csc", "bsr"):
-        return None
-    if A.format == "bsr":
-        rows, columns = rows // A.blocksize[0], columns // A.blocksize[1]
-    major, minor, what = (columns, rows, "row") if A.format == "csc" else (rows, columns, "column")
-    if A.indptr.ndim != 1 or A.indices.ndim != 1 or len(A.indptr) != major + 1:
-        return f"its index pointer has {A.indptr.size} elements instead of {major + 1}"
-    if A.indptr[0] != 0 or (np.diff(A.indptr) < 0).any():
-        return "its index pointer does not increase from zero"
-    n_stored = A.indptr[-1]
-    if n_stored > min(len(A.indices), len(A.data)):
-        return f"it announces {n_stored} entries and holds {min(len(A.indices), len(A.data))}"
-    return _outside(A.indices[:n_stored], minor, what)
-
-
-def _outside(index: NDArray, bound: int, what: str) -> str | None:
-    if len(index) and (index.min() < 0 or index.max() >= bound):
-        worst = index.min() if index.min() < 0 else index.max()
-        return f"the {what} index {worst} is outside 0..{bound - 1}"
+    try:
+        if A.format == "coo":
+            sp.coo_array((A.data, A.coords), shape=A.shape)
+        elif A.format in ("csr", "csc", "bsr"):
+            type(A)((A.data, A.indices, A.indptr), shape=A.shape).check_format(full_check=True)
+    except ValueError as error:
+        return str(error)
     return None
 
 

@@ -1,5 +1,6 @@
 """From null fields to coordinates: projecting translations out, setting aside what stays loose, choosing the gauge."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import svd
+from ..linalg import Factorisation, svd
+from ..linalg.definite import STEPS
 from ..recovery import Evidence
 from ..tolerances import ALIKE, CANCELLED, SINGULAR
 
@@ -60,6 +62,30 @@ def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArra
     points[~loose], freedom = _choose(moving, exact=bool(exact))
     gap = float(values[max(count, common) :].min(initial=np.inf))
     return Shape(points, Evidence(dimension, float(values[d]), gap, rows), freedom, bool(exact))
+
+
+def least_fields(
+    residual: Callable[[NDArray], NDArray], solver: Factorisation, order: int, d: int, stiff: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Orthonormal fields (order, k) of least residuals, and their increasing singular values; the last is `stiff`.
+
+    By inverse iteration with a factor of the normal matrix; fewer fields if there are no more, or too many.
+    """
+    count = min(4 * d, order)
+    while True:
+        x = np.random.default_rng(0).standard_normal((order, count))
+        for _ in range(STEPS):
+            x = np.linalg.qr(solver.solve(x))[0]
+        x, values = singular(residual(x), x)
+        if values[-1] > stiff or count >= min(order, MOST_FIELDS):
+            return x, values
+        count = min(2 * count, order)
+
+
+def singular(residuals: NDArray, x: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Combinations of fields x (N, k) with residuals (m, k) that are singular ones, and their values, increasing."""
+    _, values, v = svd(np.linalg.qr(residuals, mode="r"))
+    return x @ v[::-1].T, np.concatenate([values, np.zeros(x.shape[1] - len(values))])[::-1]
 
 
 def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:

@@ -1,6 +1,6 @@
 """Scalar matrices in the plane: conformal null vector, unknown scale, polish, error bars, gauge."""
 
-from .conformal import ConformalOptions, conformal_map, estimate_scale
+from .conformal import conformal_map, estimate_scale
 from .cotangent import edge_weights, weight_gradient
 from .deviations import covariances
 from .frame import canonical_frame, collinear, fit_similarity
@@ -12,7 +12,6 @@ from .polish import CAREFUL, PolishOptions, count_flipped, polish
 
 __all__ = [
     "CAREFUL",
-    "ConformalOptions",
     "ConformalPencil",
     "PieceMesh",
     "PolishOptions",

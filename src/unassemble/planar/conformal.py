@@ -20,25 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
+from ..tolerances import ALIKE, ROUNDED, SUMMED
 from ..topology import Piece
 from ..topology.keys import runs
 from .pencil import ConformalPencil, ShiftedSearch
 
 _log = logging.getLogger(__name__)
 
-_MANY = 100  # triangles that agree, if they are no small share: mirrored neighbours among others
 
-
-@dataclass(frozen=True)
-class ConformalOptions:
-    """Settings of the search; the defaults serve every matrix that we know."""
-
-    krylov_steps: int = 8  # most solves with one factorisation
-    max_factorisations: int = 8  # factorisations before giving up
-    first_shift: float = 0.7  # relative to the estimate of c; any value well inside (0, 1) will do
-    # distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
-    margin: float = 1e-11
+_STEPS = 8  # most solves with one factorisation
+_MARGIN = 1e-11  # distance of the last shift below c, relative; nearer, M would be singular to working accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +44,8 @@ class ConformalMap:
     converged: bool  # whether position changes fell to the level that the conditioning allows
 
 
-def estimate_scale(piece: Piece, weights: NDArray) -> tuple[float, float | None]:
-    """A guess of c, and what is probably right to all digits: what many triangles say, as on grids, or 1.
+def estimate_scale(piece: Piece, weights: NDArray) -> float:
+    """A guess of c.
 
     The halves g = cot / 2 of a triangle's three weights satisfy g1 g2 + g2 g3 + g3 g1 = 1/4. Sharing
     each weight equally between its two triangles gives one value of c from each triangle; the median is right to some
@@ -67,27 +58,8 @@ def estimate_scale(piece: Piece, weights: NDArray) -> tuple[float, float | None]
     a, b, c = (weights / largest / np.where(piece.inner, 2, 1))[piece.opposite].T
     form = a * b + b * c + c * a
     sizes = 2 * np.sqrt(form[form > 0])  # of triangles of which the three shares belong to a triangle at all
-    common = _common(sizes) if len(sizes) else None
-    size = float(np.median(sizes)) if len(sizes) else float(np.sqrt(3) * np.abs(weights / largest).mean())
-    unit = float(sign * size * largest)
-    if common is not None:
-        return unit, float(sign * common * largest)
-    return unit, 1.0 if abs(1 / unit - 1) < 0.3 else None
-
-
-def _common(values: NDArray[np.float64]) -> float | None:
-    """What most of some positive values are to nearly all digits, or very many, and no other value half as many.
-
-    On meshes of a few triangles over and over some values are frequent that are wrong.
-    """
-    values = np.sort(values)
-    alike = np.searchsorted(values, values * (1 + SUMMED), side="right") - np.arange(len(values))
-    first = int(np.argmax(alike))
-    count = int(alike[first])
-    alike[first : first + count] = 0
-    if count < min(MOST * len(values), max(LITTLE * len(values), _MANY)) or 2 * alike.max() > count:
-        return None
-    return float(np.median(values[first : first + count]))
+    size = np.median(sizes) if len(sizes) else np.sqrt(3) * np.abs(weights / largest).mean()
+    return float(sign * size * largest)
 
 
 def conformal_map(
@@ -97,21 +69,22 @@ def conformal_map(
     scale: float | None = None,
     unit: float | None = None,
     sharp: bool = True,
-    options: ConformalOptions | None = None,
+    first_shift: float = 0.7,
+    most: int = 8,
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
-    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
-    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `unit`: a
-    guess of c, where weights are not those of the piece's triangles; c = 1 is then tried once that is near. `sharp`:
-    go on until z, not only c, has converged, which a polish does not need.
+    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise c = 1 is tried first if the
+    median of what triangles say allows it. `unit`: a guess of c, where weights are not those of the piece's triangles;
+    c = 1 is then tried once that is near. `sharp`: go on until z, not only c, has converged, which a polish does not
+    need. `first_shift`: relative to the guess of c, well inside (0, 1) or 0; `most`: factorisations before giving up.
 
     Raises GeometryError if no map of positive area is found.
     """
-    options = options or ConformalOptions()
     likely, whole = None, 1 / unit if unit else np.inf
     if unit is None:
-        unit, likely = estimate_scale(piece, weights)
+        unit = estimate_scale(piece, weights)
+        likely = 1.0 if abs(unit - 1) < 0.3 * unit else None
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
@@ -125,26 +98,26 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, options.krylov_steps)
+    search = ShiftedSearch(pencil, _STEPS)
     z = start = _smooth_start(piece)
     known = scale if scale is not None else likely
     spread = None
     if known is not None:
-        z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
+        z, c, _ = search.at(known / unit * (1 - _MARGIN), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
         spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     if spread is None:
-        z, c, spread = search.at(options.first_shift, start)
+        z, c, spread = search.at(first_shift, start)
         if c < ALIKE:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
-    while search.factorisations < options.max_factorisations:
-        distance = min(max(4 * spread, options.margin), 0.3)
+    while search.factorisations < most:
+        distance = min(max(4 * spread, _MARGIN), 0.3)
         one = abs(c / whole - 1) <= distance
-        z, c, spread = search.at(whole * (1 - options.margin) if one else c * (1 - distance), z)
+        z, c, spread = search.at(whole * (1 - _MARGIN) if one else c * (1 - distance), z)
         near, whole = one or distance <= 1e-9, np.inf if one else whole
         converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:

@@ -2,9 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import block_array, coo_array
+from scipy.sparse.linalg import lsqr
 
-from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
 from ..topology.numbering import connected
@@ -100,7 +100,12 @@ def _joined(
     extent = float(size.max())
     weight = np.r_[np.where(held | stiff, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= _DENSE else least_norm(system, rhs)
+    if n <= _DENSE:
+        solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0]
+    else:  # of all solutions that with the least norm, as well
+        real = block_array([[system.real, -system.imag], [system.imag, system.real]], format="csr")
+        exact = {"atol": 0.0, "btol": 0.0, "conlim": 0.0, "iter_lim": 50 * real.shape[1]}
+        solution = lsqr(real, np.append(rhs.real, rhs.imag), **exact)[0].reshape(2, -1).T @ [1, 1j]
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
     if (np.abs(turn) * size <= ALIKE * extent).any():

@@ -1,7 +1,5 @@
 """Normal equations of the cotangent weights, with the similarities pinned."""
 
-from typing import Protocol
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -13,54 +11,34 @@ from ..topology import Piece
 from .cotangent import weight_gradient
 
 
-class Jacobian(Protocol):
-    """The derivative of weights at given positions; displacements are complex (n,)."""
+class Jacobian:
+    """The derivative of weights at given positions, (e, 2 n) in blocks of x and y; displacements are complex (n,)."""
 
-    n: int
-
-    @property
-    def matrix(self) -> sp.bsr_array:
-        """(e, 2 n) in blocks of x and y."""
+    def __init__(self, matrix: sp.bsr_array):
+        self.matrix, self.n = matrix, matrix.shape[1] // 2
 
     def forward(self, displacement: NDArray) -> NDArray:
         """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
+        return np.asarray(self.matrix @ np.ascontiguousarray(displacement.T).view(np.float64).T)
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
+        return np.asarray(self.matrix.T @ change).view(np.complex128)
 
 
-class WeightJacobian:
-    """J = dw / d(x, y) at given positions; displacements are complex (n,).
+class WeightJacobian(Jacobian):
+    """That of cotangent weights at positions z (n,).
 
-    `z` (n,); `spread` (e,): standard deviation of each weight, by which its row is divided.
+    `spread` (e,): standard deviation of each weight, by which its row is divided; 1 by default.
     """
 
     def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
-        self.n, self.piece, self.z = piece.n_vertices, piece, z
-        self.spread = np.ones(len(piece.edges)) if spread is None else spread
-        self._vertices = piece.stencil
         with np.errstate(invalid="ignore"):  # flat triangles
-            self._gradient = weight_gradient(piece, z) / self.spread
-
-    @property
-    def matrix(self) -> sp.bsr_array:
-        """(e, 2 n) in blocks of x and y."""
-        e = len(self.spread)
-        blocks = np.stack([self._gradient.real.T, -self._gradient.imag.T], axis=-1).reshape(-1, 1, 2)
-        vertices = self._vertices.T.astype(np.int32).ravel()
-        return sp.bsr_array((blocks, vertices, np.arange(0, 4 * e + 1, 4, dtype=np.int32)), shape=(e, 2 * self.n))
-
-    def forward(self, displacement: NDArray) -> NDArray:
-        """J d for d (n,) complex: (e,) real; for (n, k) column by column."""
-        return np.einsum("ke,ke...->e...", self._gradient, displacement[self._vertices]).real
-
-    def transpose(self, change: NDArray) -> NDArray:
-        """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
-        result = np.zeros(self.n, dtype=np.complex128)
-        for g, v in zip(self._gradient, self._vertices, strict=True):
-            result.real += np.bincount(v, g.real * change, self.n)
-            result.imag -= np.bincount(v, g.imag * change, self.n)
-        return result
+            gradient = weight_gradient(piece, z) / (1.0 if spread is None else spread)
+        blocks = np.stack([gradient.real.T, -gradient.imag.T], axis=-1).reshape(-1, 1, 2)
+        vertices, e = piece.stencil.T.astype(np.int32).ravel(), len(piece.edges)
+        start = np.arange(0, 4 * e + 1, 4, dtype=np.int32)
+        super().__init__(sp.bsr_array((blocks, vertices, start), shape=(e, 2 * len(z))))
 
 
 class NormalEquations:

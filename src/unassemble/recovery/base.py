@@ -41,14 +41,14 @@ class Recovery:
     #: (loops + 1,) loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
     boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible, a position that entries do not determine.
-    node_status: NDArray[np.int8]
+    node_status: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, np.int8))
     #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, and no other mesh
     #: is known that does.
-    status: str
+    status: str = "uncertified"
     #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
     #: one; None where this one does not fit.
     uniqueness: str | None = None
-    reason: str  #: Why, in one sentence or two.
+    reason: str = ""  #: Why, in one sentence or two.
     advice: str = ""  #: What to do next, where the mesh is not certified.
     #: ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``;
     #: ``"frame or shell"``, ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``;
@@ -61,7 +61,7 @@ class Recovery:
     #: Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
     #: entry of its row. For elasticity whose cells are not recognised the largest residual of a valid identity,
     #: relative to the size of its row.
-    backward_error: float
+    backward_error: float = np.inf
     timings: Mapping[str, float] = field(default_factory=dict)  #: Seconds by stage.
     warnings: tuple[str, ...] = ()  #: What was changed, guessed or left open.
     #: (k, 2) rows and columns of the entries that fit worst, worst first, suspects before others; empty where all fit.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,6 +69,12 @@ class PlanarMesh(Recovery):
         """
         fans, _, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
         return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
+
+    def triangulated(self) -> PlanarMesh:
+        """The same with polygons in fans of triangles."""
+        none = Polygons.none()
+        whole = self.divided()[0]
+        return replace(self, triangles=whole, polygons_offsets=none.offsets, polygons_data=none.vertices)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

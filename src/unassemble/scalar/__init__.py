@@ -1,9 +1,9 @@
 """Scalar matrices: everything that ``recover`` does with one, from its topology to the verdict."""
 
-from .joined import JoinedMesh
+from .joined import joined
 from .recover import recover_scalar
 
 __all__ = [
-    "JoinedMesh",
+    "joined",
     "recover_scalar",
 ]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import norm  # whose squares do not overflow
 
 from ..certify import Certificate
 from ..planar.terms import Term, lacking_term
@@ -29,46 +30,41 @@ _SPARE = 10  # entries beyond the unknowns, of fewer chance may give one much of
 _OF_ALL, _OF_MEAN = 0.15, 25.0  # squared misfit of an entry that stands out: of the sum, and in units of the mean
 
 
-def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search: bool) -> Evidence:
+def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> Evidence:
     """Evidence on a finished mesh; wrong entries are looked for if `search`.
 
     Unless their noise is known, errors of the size that rounding has where there are slivers do not stand out.
     """
-    freedom = solved.freedom(free_scale=free_scale)
-    noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
+    noise = None
+    if (freedom := solved.freedom) > 0:
+        noise = float(norm(certificate.differences, check_finite=False) / np.sqrt(freedom))
     suspects = _standing_out(solved) if search else NONE
     term = None
     linear = solved.topology.method != "cliques"
     if noise and linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
-        term = _term(solved, noise, free_scale=free_scale)
+        term = _term(solved, noise)
     return Evidence(None if term else noise, suspects, term)
 
 
-def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
+def _term(solved: Solved, noise: float) -> Term | None:
     """What the model lacks, as the piece tells in which chance is least likely; no entry is blamed for that."""
     if not noise <= LARGEST_NOISE * np.abs(solved.scales).min() or (solved.noise and solved.noise.digits):
         return None
     found = []
     for piece, (weights, _, mesh) in zip(solved.topology.pieces, solved.fits, strict=True):
-        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=solved.task.free_scale)
         found += [] if term is None else [term]
     least = min(found, key=lambda term: term.probability, default=None)
     return least if least and least.probability * len(found) < CHANCE else None
 
 
-def pooled_noise(solved: Solved, freedom: int) -> float:
+def pooled_noise(solved: Solved) -> float:
     """Common factor of the standard deviations of the entries' errors, in the norms that the pieces were fitted in."""
-    norms = []
+    left = []
     for weights, model, mesh in solved.fits:
         misfit = weights - mesh.scale * model.weights(mesh.z)
-        norms.append(_norm(misfit if mesh.spread is None else misfit / mesh.spread))
-    return _norm(np.array(norms)) / float(np.sqrt(max(freedom, 1)))
-
-
-def _norm(values: NDArray) -> float:
-    """Root of the sum of squares, none of which may overflow."""
-    largest = float(np.abs(values).max(initial=0.0))
-    return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
+        left.append(misfit if mesh.spread is None else misfit / mesh.spread)
+    return float(norm(np.concatenate(left), check_finite=False) / np.sqrt(max(solved.freedom, 1)))
 
 
 def _standing_out(solved: Solved) -> NDArray[np.int64]:
@@ -84,7 +80,7 @@ def _standing_out(solved: Solved) -> NDArray[np.int64]:
             left = weights / mesh.scale - model.weights(mesh.z)
             rounding = model.roundings(mesh.z)
             squares = (left / (rounding if mesh.spread is None else mesh.spread)) ** 2
-            if spare < _SPARE or (solved.noise is None and _norm(left / rounding) <= SUMMED):
+            if spare < _SPARE or (solved.noise is None and norm(left / rounding, check_finite=False) <= SUMMED):
                 continue
         squares[gone[piece.edge_rows]] = 0.0
         most = squares.max()

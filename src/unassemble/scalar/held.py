@@ -1,41 +1,68 @@
-"""A mesh held against its matrix."""
+"""A mesh held against its matrix, and against the errors of the entries where these are known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Certificate
+from ..certify import Certificate, Terms, certify, chi_square_verdict
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED, SUSPICIOUS
-from .noise import Noise, NoiseTest
+from ..recovery import ConformingMesh, PlanarMesh
+from ..tolerances import CERTIFIED, CHANCE, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
+from .noise import Noise
+from .solving import Solved
+
+
+def held(
+    matrix: OperatorMatrix,
+    mesh: PlanarMesh,
+    tensor: tuple[float, float, float] | None = None,
+    terms: Terms | None = None,
+) -> Certificate:
+    """A mesh against a matrix, its entries only or, with further terms, all of it; `tensor`: (kxx, kxy, kyy)."""
+    cells, rules = {"triangle": mesh.divided()[0]}, {"triangle": "degree 1"}
+    if isinstance(mesh, ConformingMesh):
+        cells, names = mesh.cells, mesh.quadrature.split(", ")
+        rules = {kind: next(one for one in names if ("Gauss" in one) == kind.startswith("quad")) for kind in cells}
+    factors = {kind: mesh.scale[mesh.component[own].max(axis=1)] for kind, own in cells.items()}  # hinges: the lowest
+    given = matrix.edges, matrix.entries, mesh.points
+    return certify(*given, cells, factors, rules=rules, tensor=tensor, terms=terms)
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A mesh held against the matrix, and against the errors of the entries where these are known."""
+    """A certificate, and where noise is known the test of its misfit."""
 
     certificate: Certificate
-    errors: NDArray[np.float64] | None  # (k,) standard deviations of the entries that the certificate compares
-    test: NoiseTest | None
+    solved: Solved
 
-    @classmethod
-    def of(
-        cls,
-        certificate: Certificate,
-        stored: OperatorMatrix,
-        noise: Noise | None,
-        freedom: int,
-        factors: NDArray[np.float64],
-    ) -> Held:
-        """A certificate, and the test where noise is known; `freedom`: entries less unknowns; `factors`: c."""
-        if noise is None:
-            return cls(certificate, None, None)
-        errors = noise.at(certificate.pairs, stored)
-        return cls(certificate, errors, NoiseTest.of(noise, certificate.differences / errors, freedom, factors))
+    @property
+    def limit(self) -> float:
+        """Standard deviation of noise that drowns the cotangents."""
+        return LARGEST_NOISE * float(np.abs(self.solved.scales).min())
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64] | None:
+        """(k,) standard deviations of the entries that the certificate compares."""
+        return self.solved.noise.at(self.certificate.pairs, self.solved.stored) if self.solved.noise else None
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """See :func:`unassemble.certify.chi_square_verdict`; empty without noise."""
+        if self.solved.noise is None:
+            return {}
+        misfit = self.certificate.differences / np.asarray(self.errors)
+        return chi_square_verdict(
+            misfit, self.solved.freedom, self.solved.noise.sigma, repeats=self.solved.noise.repeats
+        )
+
+    def __str__(self) -> str:
+        figures = [self.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value")]
+        return "(chi-square {:.4g} with {:.4g} degrees of freedom, p = {:.3g})".format(*figures)
 
     def fields(self, count: int, first: NDArray | None = None) -> dict[str, Any]:
         """What every result says of it, with the worst `count` entries, those of `first` (k, 2) before others."""
@@ -44,28 +71,53 @@ class Held:
             "backward_error": self.certificate.backward_error,
             "worst_entries": worst,
             "worst_misfits": misfits,
-            "chi_square": self.test.figures if self.test else None,
+            "chi_square": self.figures or None,
             "n_entries": len(self.certificate.misfits),
             "n_fitting": int(np.count_nonzero(self.certificate.misfits <= CERTIFIED)),
         }
 
     @property
-    def by_noise(self) -> bool:
-        """Whether noise decides: there is something to test, and no exact fit makes too large a noise harmless.
+    def drowned(self) -> bool:
+        """Whether almost any mesh would pass."""
+        return self.solved.noise is not None and self.solved.noise.sigma > self.limit
+
+    @property
+    def coincidence(self) -> bool:
+        """Whether entries without a mesh may be fitted to within their rounding by chance; noise given is believed."""
+        if self.solved.noise is None or self.solved.noise.digits is None:
+            return False
+        chance = (
+            self.solved.freedom
+            * self.solved.noise.different
+            * np.log(self.solved.noise.sigma * LARGEST_NOISE / self.limit)
+        )
+        return bool(chance > np.log(CHANCE))
+
+    @property
+    def likely(self) -> bool:
+        """Whether the misfit is not improbably large."""
+        return min(self.figures.get("p_value", 0.0), self.figures.get("largest_p_value", 0.0)) >= CONFIDENCE
+
+    @property
+    def by_noise(self) -> Noise | None:
+        """The noise, if it decides: there is something to test, and no exact fit makes too large a noise harmless.
 
         Entries of few digits that a mesh has exactly may be no rounded ones.
         """
-        test, error = self.test, self.certificate.backward_error
-        if test is None or test.freedom <= 0:  # no more entries than unknowns
-            return False
-        short = error <= SUSPICIOUS or not test.passed
-        return not (error <= CERTIFIED and (test.drowned or (test.noise.digits is not None and short)))
+        error = self.certificate.backward_error
+        if self.solved.noise is None or self.solved.freedom <= 0:  # no more entries than unknowns
+            return None
+        short = error <= SUSPICIOUS or not self.passed
+        harmless = error <= CERTIFIED and (self.drowned or (self.solved.noise.digits is not None and short))
+        return None if harmless else self.solved.noise
+
+    @property
+    def passed(self) -> bool:
+        """Whether the misfit is likely, and that says something."""
+        return self.likely and not (self.drowned or self.coincidence)
 
     @property
     def passes(self) -> bool:
         """Whether the numbers alone would do for a certificate."""
-        if len(self.certificate.flipped):
-            return False
-        if self.test and self.by_noise:
-            return self.test.passed
-        return self.certificate.backward_error <= CERTIFIED
+        good = self.passed if self.by_noise else self.certificate.backward_error <= CERTIFIED
+        return good and not len(self.certificate.flipped)

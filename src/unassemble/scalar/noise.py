@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import chi_square_verdict
 from ..matrix import OperatorMatrix
 from ..matrix.digits import Digits
 from ..matrix.operator import row_sizes
-from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, SMALL
+from ..tolerances import SMALL
 from ..topology import Topology
 from ..topology.keys import pair_keys
 
@@ -58,49 +57,6 @@ class Noise:
         keys = pair_keys(stored.n, *pairs.T)
         spread[np.searchsorted(keys, pair_keys(stored.n, *stored.edges.T))] = self.spread
         return self.sigma * spread
-
-
-@dataclass(frozen=True)
-class NoiseTest:
-    """A misfit held against the errors that entries have."""
-
-    noise: Noise
-    freedom: int  # entries less fitted unknowns
-    figures: dict[str, float]  # see :func:`unassemble.certify.chi_square_verdict`
-    limit: float  # standard deviation of noise that drowns the cotangents
-    worst: int  # where the misfit is largest
-
-    @classmethod
-    def of(cls, noise: Noise, misfit: NDArray[np.float64], freedom: int, factors: NDArray[np.float64]) -> NoiseTest:
-        """Test the misfit (k,) of all entries, in standard deviations, of pieces with `factors` c."""
-        figures = chi_square_verdict(misfit, freedom, noise.sigma, repeats=noise.repeats)
-        return cls(noise, freedom, figures, LARGEST_NOISE * float(np.abs(factors).min()), int(np.abs(misfit).argmax()))
-
-    def __str__(self) -> str:
-        figures = [self.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value")]
-        return "(chi-square {:.4g} with {:.4g} degrees of freedom, p = {:.3g})".format(*figures)
-
-    @property
-    def drowned(self) -> bool:
-        """Whether almost any mesh would pass."""
-        return self.noise.sigma > self.limit
-
-    @property
-    def coincidence(self) -> bool:
-        """Whether entries without a mesh may be fitted to within their rounding by chance; noise given is believed."""
-        equations = self.freedom * self.noise.different
-        chance = equations * np.log(self.noise.sigma * LARGEST_NOISE / self.limit)
-        return self.noise.digits is not None and chance > np.log(CHANCE)
-
-    @property
-    def likely(self) -> bool:
-        """Whether the misfit is not improbably large."""
-        return min(self.figures["p_value"], self.figures["largest_p_value"]) >= CONFIDENCE
-
-    @property
-    def passed(self) -> bool:
-        """Whether that says something."""
-        return self.likely and not (self.drowned or self.coincidence)
 
 
 def with_vanished(topology: Topology, noise: Noise | None) -> NDArray[np.float64]:

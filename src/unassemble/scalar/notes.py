@@ -44,22 +44,13 @@ def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
 
 
 def vanished_notes(topology: Topology) -> list[str]:
-    """Cells that stay undivided, boundary edges without an entry."""
-    notes = []
-    polygons = topology.polygons
-    if k := polygons.count:
-        notes.append(
-            f"{count_of(k, 'cell has', 'cells have')} more than three vertices, on one circle: entries on diagonals "
-            "vanish whichever way such a cell is divided, so any division into triangles gives the same matrix"
-        )
-    diagonals = int((polygons.size - 3).sum())
-    if len(topology.vanished) > diagonals:
-        count = len(topology.vanished) - diagonals
-        notes.append(
-            count_of(count, "boundary edge faces a right angle and has", "boundary edges face right angles and have")
-            + " no entry in the matrix"
-        )
-    return notes
+    """Cells that stay undivided."""
+    if not (k := topology.polygons.count):
+        return []
+    return [
+        f"{count_of(k, 'cell has', 'cells have')} more than three vertices, on one circle: entries on diagonals "
+        "vanish whichever way such a cell is divided, so any division into triangles gives the same matrix"
+    ]
 
 
 def _some(rows: NDArray, count: int = 8) -> str:

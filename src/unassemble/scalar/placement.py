@@ -86,10 +86,13 @@ class Placement:
         targets = targets - origin
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
-        notes: list[str] = []
         if self._directed(piece):
             assert self.direction is not None
-            positions = self._by_direction(piece, z, piece.local(np.array(self.direction[:2])))
+            ends = piece.local(np.array(self.direction[:2]))
+            aim = np.array([0, np.exp(1j * np.deg2rad(self.direction[2]))])
+            positions, notes = self._by_anchors(piece, z, ends, aim)
+            length = np.abs(positions[piece.edges[:, 0]] - positions[piece.edges[:, 1]]).mean()
+            positions = (positions - positions.mean()) / length
         elif self.tensor:
             raise InputError(
                 f"`tensor` cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
@@ -175,33 +178,20 @@ class Placement:
             if self.handed:
                 notes.append("three or more anchors fix the mirror image; `handed` was not used")
         else:
-            both = "anchors in line leave the mirror image open: give one that is not, or `handed`"
-            frame = self._of_two([fit[0] for fit in fits], piece, z, rows[:2], both)
+            frame = self._of_two([fit[0] for fit in fits], piece, z, rows[:2])
             if not self.handed:
-                notes.append("the anchors leave two mirror images; the choice between them is by convention")
+                notes.append("what was given leaves two mirror images; the choice between them is by convention")
         placed = frame(z)
         misfit = float(np.abs(placed[rows] - known).max())
         if misfit > 1e-6 * np.abs(known - known.mean()).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
         return (self.tensor.from_laplacian(placed) if self.tensor else placed), notes
 
-    def _by_direction(self, piece: Piece, z: NDArray, ends: NDArray) -> NDArray:
-        assert self.direction is not None
-        aim = np.exp(1j * np.deg2rad(self.direction[2]))
-        aim = self.tensor.to_laplacian(aim) if self.tensor else aim
-        line = z[ends[1]] - z[ends[0]]
-        frames = [Similarity(complex(aim / line), 0j), Similarity(complex(aim / np.conj(line)), 0j, mirror=True)]
-        frame = self._of_two(frames, piece, z, ends, "`direction` leaves the mirror image open: add `handed`")
-        placed = frame(z)
-        placed = self.tensor.from_laplacian(placed) if self.tensor else placed
-        length = np.abs(placed[piece.edges[:, 0]] - placed[piece.edges[:, 1]]).mean()
-        return (placed - placed.mean()) / length
-
-    def _of_two(self, frames: list[Similarity], piece: Piece, z: NDArray, ends: NDArray, error: str) -> Similarity:
+    def _of_two(self, frames: list[Similarity], piece: Piece, z: NDArray, ends: NDArray) -> Similarity:
         """The frame that puts the centroid on the wanted side of the line between two vertices, or by convention."""
         if not self.handed:
             if self.tensor:
-                raise InputError(error)
+                raise InputError("the mirror image is open: give a third anchor that is not in line, or `handed`")
             return frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
         line, offset = z[ends[1]] - z[ends[0]], z.mean() - z[ends[0]]
         side = (np.conj(line) * offset).imag

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..cells import Alternative
 from ..certify import Certificate
+from ..certify_spare import without_spare_equations
 from ..planar.terms import COEFFICIENT, MASS, Term
 from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of
-from .noise import NoiseTest
+from .noise import Noise
 from .solving import Solved, leaders
 
 if TYPE_CHECKING:
@@ -39,43 +40,58 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     if apart:
         yield f"the matrix is given back to {error:.1e} (relative), but {apart}", ""
-    if f.test:
-        allowed = max(PLACED, f.test.noise.sigma / float(np.abs(f.solved.scales).min()))
+    if noise := f.near.by_noise:
+        allowed = max(PLACED, noise.sigma / float(np.abs(f.solved.scales).min()))
         if f.evidence.term:
             yield from _lacking(f, f.evidence.term)
     if not doubt <= allowed:
         yield f"{f.fits}, but points are known to about {doubt:.0e} of the size only", ""
         yield from ((note, "") for note in f.trouble)
-    if len(topology.bare_edges) and not f.test:
+    if len(topology.bare_edges) and not noise:
         i, j = topology.edges[topology.bare_edges[0]]
         advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
         yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice
-    if len(rows := f.mesh.loose()):
+    if len(rows := _without_spare(f)):
         one = f"the piece of row {rows[0]} has" if len(rows) == 1 else f"{len(rows)} pieces, as of row {rows[0]}, have"
         proves = (
             f"nearly any entries belong to such a mesh, and that it gives the matrix back to {error:.1e} (relative)"
         )
         yield (
             f"{one} no entry to spare: {proves} proves nothing",
-            "" if f.known_scale else "give `scale` if it is known",
+            "give `scale` if it is known" if f.solved.task.free_scale else "",
         )
+
+
+def _linear(f: Findings) -> bool:
+    return f.solved.topology.method != "cliques"
+
+
+def _without_spare(f: Findings) -> NDArray[np.int64]:
+    """A row of each piece that has no equations to spare."""
+    solved, known = f.solved, not f.solved.task.free_scale
+    if _linear(f):
+        return without_spare_equations(solved.stored.edges, f.mesh.points, f.mesh.divided()[0], known_scale=known)
+    return np.array([piece.vertices.min() for piece in solved.topology.pieces])[solved.spare + known <= 0]
 
 
 def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     """What does not fit, and what it looks like."""
-    topology, stored, certificate, test = f.solved.topology, f.solved.stored, f.certificate, f.test
-    if test and test.drowned:
-        much = f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
-        yield f"{much}{test.limit:.2g}, {LARGEST_NOISE:g} times the scale", "give less noise, if entries are that good"
+    topology, stored, certificate, noise = f.solved.topology, f.solved.stored, f.certificate, f.near.by_noise
+    if noise and f.near.drowned:
+        much = f"{noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
+        yield (
+            f"{much}{f.near.limit:.2g}, {LARGEST_NOISE:g} times the scale",
+            "give less noise, if entries are that good",
+        )
         return
     without = stored.incomplete_rows.any()
     model = _KEEP_ROWS if without else _ONE_COEFFICIENT if stored.adds_up.all() else _CHECK_MODEL
-    model = _LEAVE_SCALE if f.known_scale else model
+    model = model if f.solved.task.free_scale else _LEAVE_SCALE
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         yield f"{parts} no mesh: {topology.failures[0]}", _CHECK_MODEL
         return
-    if apart and not test:
+    if apart and not noise:
         yield apart, model
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
@@ -85,20 +101,21 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         return
     if len(flipped := certificate.flipped):
         some = count_of(len(flipped), "cell is", "cells are")
-        rows = words_of(np.sort(next(islice(chain(*f.mesh.cells), int(flipped[0]), None))))
+        cells = [f.mesh.divided()[0]] if _linear(f) else f.mesh.cells.values()
+        rows = words_of(np.sort(next(islice(chain(*cells), int(flipped[0]), None))))
         yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
-    elif f.evidence.term and (test or not f.known_scale):
+    elif f.evidence.term and (noise or f.solved.task.free_scale):
         yield from _lacking(f, f.evidence.term)
     elif len(f.evidence.suspects):
         i, j = f.evidence.suspects[0]
         said = f"the entry of rows {i} and {j} stands out from the misfit of all others"
         yield said, "check the entries that stand out, which the report lists"
-    if test:
-        if test.likely and test.coincidence:
+    if noise:
+        if f.near.likely and f.near.coincidence:
             chance = "there are too few different entries beyond the unknowns to tell that from chance"
             yield f"{f.fits}, but {chance}", "write the entries with more digits"
-        if not test.likely:
-            yield _unlikely(f, test), "check the noise, and the entries"
+        if not f.near.likely:
+            yield _unlikely(f, noise), "check the noise, and the entries"
         yield _astray(f), ""
     elif remark := _like_noise(f):
         if without:
@@ -142,19 +159,20 @@ def _astray(f: Findings) -> str:
     """On a mesh that is not the one of known noise: where the polish has ended."""
     if len(f.evidence.suspects):
         return ""
-    if not f.polished:
+    if not f.solved.task.options.polished:
         return "the mesh was not polished"
     why = "whether that is because of the start, wrong entries or wrong cells cannot be told"
     return f"the polish has not come to a mesh that explains the matrix, and {why}"
 
 
-def _unlikely(f: Findings, test: NoiseTest) -> str:
+def _unlikely(f: Findings, noise: Noise) -> str:
     """That noise would not leave such a misfit."""
-    if test.figures["p_value"] < CONFIDENCE:
-        return f"the misfit is more than {test.noise} explains {test}"
-    i, j = f.certificate.pairs[test.worst]
+    figures = f.near.figures
+    if figures["p_value"] < CONFIDENCE:
+        return f"the misfit is more than {noise} explains {f.near}"
+    i, j = f.certificate.pairs[np.abs(f.certificate.differences / np.asarray(f.near.errors)).argmax()]
     return (
-        f"the entry of rows {i} and {j} is off by {test.figures['largest']:.1f} standard deviations of {test.noise}, "
+        f"the entry of rows {i} and {j} is off by {figures['largest']:.1f} standard deviations of {noise}, "
         f"more than the largest of {len(f.certificate.pairs)} would be"
     )
 

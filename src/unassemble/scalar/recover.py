@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative, alternatives
-from ..certify import certify
-from ..certify_spare import without_spare_equations
 from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
@@ -21,13 +19,13 @@ from ..tolerances import SIGMAS
 from ..topology import Polygons
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
-from .held import Held
-from .joined import JoinedMesh
+from .held import Held, held
+from .joined import joined
 from .noise import Noise
 from .notes import vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
-from .verdict import Drawn, Findings, verdict
+from .verdict import Findings, verdict
 
 
 def recover_scalar(
@@ -52,38 +50,28 @@ def recover_scalar(
         lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in topology.pieces]
         sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
 
-    given, tensor = (stored.edges, stored.entries), placement.coefficients
+    def drawn(placed: list[NDArray]) -> PlanarMesh:
+        return joined(topology, placed, solved.scales / placement.stretch, placement.operator)
 
-    def drawn(placed: list[NDArray]) -> Drawn:
-        mesh = JoinedMesh.of(topology, placed, solved.scales / placement.stretch)
-        triangles, factors = mesh.triangles, mesh.scale[mesh.triangle_piece]
-        return Drawn(
-            mesh.points,
-            [triangles],
-            lambda points: certify(*given, points, {"triangle": triangles}, {"triangle": factors}, tensor=tensor),
-            lambda: without_spare_equations(stored.edges, mesh.points, triangles, known_scale=task.scale is not None),
-            partial(_other_meshes, mesh, clock, task),
-            PlanarMesh,
-            mesh.fields(triangulate=options.triangulate) | {"n_holes": topology.n_holes},
-        )
-
-    return finished(solved, drawn, (*vanished_notes(topology), *topology.failures), clock, task, sizes)
+    said = (*vanished_notes(topology), *topology.failures)
+    found = finished(solved, drawn, partial(_other_meshes, clock), said, clock, sizes)
+    return found.triangulated() if options.triangulate else found
 
 
 def finished(
     solved: Solved,
-    drawn: Callable[[list[NDArray]], Drawn],
+    drawn: Callable[[list[NDArray]], PlanarMesh],
+    other_meshes: Callable[[Findings], tuple[list[Alternative], str]],
     notes: Sequence[str],
     clock: Clock,
-    task: Task,
     sizes: NDArray[np.float64] | None = None,
 ) -> PlanarMesh:
     """From positions of pieces of any element to the answer: place, certificate, evidence, error bars and verdict.
 
-    `drawn`: pieces at positions, (k,) each, as a mesh; `notes`: what is to be said of it; `sizes` (pieces,): of pieces
-    whose size nothing else tells.
+    `drawn`: pieces at positions, (k,) each, as a mesh; `other_meshes`: those that fit as well, and the uniqueness;
+    `notes`: what is to be said; `sizes` (pieces,): of pieces whose size nothing else tells.
     """
-    topology, placement, options, free_scale = solved.topology, task.placement, task.options, task.scale is None
+    topology, placement, options = solved.topology, solved.task.placement, solved.task.options
     with clock("place"):
         nodes, remarks = [mesh.nodes for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
         placed, origins, said = placement.placed(topology, nodes, remarks, sizes)
@@ -91,34 +79,30 @@ def finished(
         shift = origins[topology.component]
         written = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        near = far = _held(solved, mesh, mesh.points, free_scale=free_scale)
+        near = far = Held(held(solved.stored, mesh, placement.coefficients), solved)
         if origins.any():
-            far = _held(solved, mesh, written, free_scale=free_scale)
-        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
+            far = Held(held(solved.stored, replace(mesh, points=written), placement.coefficients), solved)
+        evidence = weigh(solved, near.certificate, search=not near.passes)
     deviations = None
     if options.standard_deviations:
         with clock("deviations"):
-            deviations = _deviations(solved, task, placed)
-    status, uniqueness, reason, others = verdict(
-        Findings(solved, mesh, origins, near, far, evidence, not free_scale, options.polished)
-    )
+            deviations = _deviations(solved, placed)
+    status, uniqueness, reason, others = verdict(Findings(solved, mesh, origins, near, far, evidence), other_meshes)
     notes = [*solved.stored.warnings, *said, *notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if uniqueness == "searched" and not small(solved.stored):
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     refused = status == "uncertified" and uniqueness is None
-    return mesh.kind(
-        **mesh.fields,
+    return replace(
+        mesh,
         **far.fields(10 if refused else 0, evidence.suspects),
         points=written,
-        hinges=topology.hinges,
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=status,
         uniqueness=uniqueness,
         reason=reason.text,
         advice=reason.advice,
-        operator=placement.operator,
         timings=clock.timings,
         warnings=tuple(notes),
         standard_deviations=deviations,
@@ -134,16 +118,10 @@ def small(stored: OperatorMatrix) -> bool:
     return bool(np.bincount(connected(stored.n, *stored.edges.T)[1]).max() <= SEARCHED_ROWS)
 
 
-def _held(solved: Solved, mesh: Drawn, points: NDArray, *, free_scale: bool) -> Held:
-    """The certificate of a mesh with these points, and the test against noise."""
-    freedom = solved.freedom(free_scale=free_scale)
-    return Held.of(mesh.held(points), solved.stored, solved.noise, freedom, solved.scales)
-
-
-def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
+def _deviations(solved: Solved, placed: list[NDArray]) -> NDArray:
     """(n, 2) standard deviations in the final frame, in which pieces are `placed`, (k,) each."""
-    pieces, tensor, free = solved.topology.pieces, task.placement.tensor, task.scale is None
-    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
+    pieces, tensor = solved.topology.pieces, solved.task.placement.tensor
+    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved)
     result = np.full((solved.topology.n_vertices, 2), np.nan)
     for p in range(len(pieces))[::-1]:  # the first piece at a hinge comes last
         model, mesh = solved.models[p], solved.meshes[p]
@@ -156,7 +134,7 @@ def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
             weights / spread,
             nodes,
             distant_pair(z),
-            free_scale=free,
+            free_scale=solved.task.free_scale,
             stretch=tensor.root if tensor else None,
             nodes=model.nodes,
         )
@@ -165,13 +143,14 @@ def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     return result
 
 
-def _other_meshes(mesh: JoinedMesh, clock: Clock, task: Task, findings: Findings) -> tuple[list[Alternative], str]:
+def _other_meshes(clock: Clock, findings: Findings) -> tuple[list[Alternative], str]:
     """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
 
     Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
     zeros show it no better than those that are not.
     """
-    solved, stored, noise = findings.solved, findings.solved.stored, findings.solved.noise
+    solved, mesh, task = findings.solved, findings.mesh, findings.solved.task
+    stored, noise = solved.stored, solved.noise
     shown = solved.topology.method == "3-cycles"
     zero = stored.entries == 0
     if shown and not zero.any():
@@ -182,7 +161,8 @@ def _other_meshes(mesh: JoinedMesh, clock: Clock, task: Task, findings: Findings
     z = np.asarray(mesh.points @ [1, 1j], dtype=np.complex128)
     if task.placement.tensor:
         z = np.asarray(task.placement.tensor.to_laplacian(z), dtype=np.complex128)
-    cells = Polygons.joined([Polygons.of_triangles(mesh.triangles[~mesh.in_polygon]), mesh.polygons])
+    polygons = Polygons(mesh.polygons_offsets, mesh.polygons_data)
+    cells = Polygons.joined([Polygons.of_triangles(mesh.triangles), polygons])
     agree = SIGMAS * sigma / float(np.abs(solved.scales).min())
     with clock("ambiguity"), blas_threads(1):  # many small problems
         others = alternatives(given.without(zero), cells, z, task.scale, agree)

@@ -37,6 +37,11 @@ class Task:
         """The factor of the Laplacian, where c is known."""
         return None if self.options.scale is None else self.options.scale * self.placement.stretch
 
+    @property
+    def free_scale(self) -> bool:
+        """Whether c is fitted."""
+        return self.options.scale is None
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -49,6 +54,7 @@ class Solved:
     meshes: Sequence[PieceMesh]
     models: Sequence[Model]  # their weights as functions of positions
     spare: NDArray[np.int64]  # (pieces,) entries of each less unknowns, c among these
+    task: Task
     noise: Noise | None  # without that of rounding, if the misfit is far beyond it
 
     @property
@@ -62,11 +68,12 @@ class Solved:
         """(pieces,) c of each, the factor of the Laplacian."""
         return np.array([mesh.scale for mesh in self.meshes])
 
-    def freedom(self, *, free_scale: bool) -> int:
+    @property
+    def freedom(self) -> int:
         """Entries less unknowns: coordinates of each piece, and each c that was fitted."""
         lead = leaders(self.topology, self.spare)
         fitted = int(np.sum((lead == np.arange(len(lead))) | (self.scales != self.scales[lead])))
-        return int(self.spare.sum()) + len(lead) - (fitted if free_scale else 0)
+        return int(self.spare.sum()) + len(lead) - (fitted if self.task.free_scale else 0)
 
 
 def leaders(topology: Topology, spare: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -118,7 +125,7 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
             for why, mesh in zip(whys, meshes, strict=True)
         ]
         topology, meshes = _successes(topology, sound)
-    return Solved(stored, matrix, topology, meshes, list(map(model_of, topology.pieces)), _spare(topology), noise)
+    return Solved(stored, matrix, topology, meshes, list(map(model_of, topology.pieces)), _spare(topology), task, noise)
 
 
 def _spare(topology: Topology) -> NDArray[np.int64]:

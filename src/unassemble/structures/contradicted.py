@@ -7,9 +7,6 @@ equations are satisfied or left alone, as long as those that hold determine all 
 R. Chartrand and W. Yin, Iteratively reweighted algorithms for compressive sensing, ICASSP 2008, 3869-3872.
 """
 
-from collections.abc import Iterable
-from itertools import islice
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -17,7 +14,7 @@ from numpy.typing import NDArray
 from ..budget import REFINEMENTS
 from ..linalg import solved
 from ..tolerances import ALIKE, CERTIFIED, MOST, ROUNDED
-from ..words import count_of
+from ..words import count_of, words_of
 from .equations import Equations
 from .nodes import Nodes
 
@@ -50,19 +47,10 @@ def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDA
     return (out, spoiled) if out.any() and out.mean() <= 1 - MOST else None
 
 
-def said_of(nodes: Nodes, spoiled: NDArray[np.int64]) -> str:
-    """Which nodes and members these are, in words."""
-    pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
-    pairs = pairs[np.isin(pairs, spoiled).all(axis=1)]
-    between = f" ({_listed(f'{i}-{j}' for i, j in pairs)})" if len(pairs) else ""
+def said_of(spoiled: NDArray[np.int64]) -> str:
+    """Which nodes these are, in words."""
+    some = words_of(spoiled[:10].tolist()) + (", ..." if len(spoiled) > 10 else "")
     return (
-        f"the rows of {count_of(len(spoiled), 'node')} ({_listed(map(str, spoiled))}) contradict the others and were "
-        f"left out: elements there{between}, or some of them, strain where they move rigidly, as with offsets or "
-        "springs"
+        f"the rows of {count_of(len(spoiled), 'node')} ({some}) contradict the others and were left out: elements "
+        "between them, or some of these, strain where they move rigidly, as with offsets or springs"
     )
-
-
-def _listed(names: Iterable[str]) -> str:
-    """The first ten of some names."""
-    first = list(islice(names, 11))
-    return ", ".join([*first[:10], *(["..."] if len(first) > 10 else [])])

@@ -60,7 +60,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     left = f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
     said = f"rigid rotations of the nodes cause no forces{blocks}", left
     held = Held(error, force, again, rounding, said, used, abs(whole[used]).sum(axis=0) > 0)
-    notes = [said_of(nodes, found.spoiled)] if len(found.spoiled) else []
+    notes = [said_of(found.spoiled)] if len(found.spoiled) else []
     found = replace(found, points=np.pad(found.points, ((0, 0), (0, layout.space - layout.dim))))
     fields: dict[str, Any] = {}
     if request.cells and error < max(ALIKE, spread):

@@ -1,15 +1,13 @@
 """Equations for coordinates solved by least squares: what they leave free, and which of them are spare."""
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import REFINEMENTS
 from ..errors import GeometryError
-from ..linalg import Factorisation, UpperTriangle, nearly_singular
-from ..linalg.definite import STEPS
-from ..nodes.shape import MOST_FIELDS, in_gauge, shape
+from ..linalg import UpperTriangle, nearly_singular
+from ..nodes.shape import in_gauge, least_fields, shape
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, LAST_DIGITS, SINGULAR, SMALL
 from .equations import Equations
@@ -46,8 +44,10 @@ def least_squares(
     normal = operator.T @ operator
     stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
     with nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored))) as solver:
-        fields, values = _least_fields(operator, solver, d)
-        free = fields[..., values <= SINGULAR].reshape(operator.shape[1], -1)
+        fields, values = least_fields(operator.__matmul__, solver, operator.shape[1], d, SINGULAR)
+        if values[-1] <= SINGULAR and len(values) < operator.shape[1]:
+            raise GeometryError("the equations away from supports leave most of the structure free")
+        free = fields[:, values <= SINGULAR]
         x = np.zeros((operator.shape[1], sides.shape[1]))
         for _ in range(REFINEMENTS):
             step = solver.solve(operator.T @ (sides - operator @ x))
@@ -56,24 +56,7 @@ def least_squares(
             if np.abs(step[:, 0]).max() <= LAST_DIGITS * np.abs(x[:, 0]).max():
                 break
     gap = float(values[values > SINGULAR].min(initial=np.inf))
-    return x[:, 0], sides - operator @ x, fields, values, gap
-
-
-def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
-    """Fields (n, d, k) that the operator maps to least, and their singular values."""
-    order = operator.shape[1]
-    count = min(4 * d, order)
-    while True:
-        x = np.random.default_rng(0).standard_normal((order, count))
-        for _ in range(STEPS):
-            x = np.linalg.qr(solver.solve(x))[0]
-        _, values, v = scipy.linalg.svd(np.linalg.qr(operator @ x, mode="r"))
-        values = np.concatenate([values, np.zeros(count - len(values))])[::-1]
-        if values[-1] > SINGULAR or count == order:
-            return (x @ v[::-1].T).reshape(-1, d, count), values
-        if count >= MOST_FIELDS:
-            raise GeometryError("the equations away from supports leave most of the structure free")
-        count = min(2 * count, order)
+    return x[:, 0], sides - operator @ x, fields.reshape(-1, d, len(values)), values, gap
 
 
 def unnoticed_in(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import GeometryError, SolverError
-from ...planar.conformal import ConformalOptions, conformal_map
+from ...planar.conformal import conformal_map
 from ...planar.hinges import gap
 from ...planar.piece import PieceMesh
 from ...tolerances import ALIKE, SMALL
@@ -19,7 +19,7 @@ from ...topology.pieces import planar_pieces
 from ..candidates.candidates import Candidates
 from .within_errors import Placed, misfits, polished
 
-_OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
+_FACTORISATIONS = 4  # what takes more has wrong cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,7 @@ def _map_of(piece: Piece, weights: NDArray) -> PieceMesh | None:
     `weights` (e,): -A_ij of its edges.
     """
     try:
-        found = conformal_map(piece, weights, sharp=False, options=_OPTIONS)
+        found = conformal_map(piece, weights, sharp=False, most=_FACTORISATIONS)
     except (GeometryError, SolverError):
         return None
     return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None

@@ -24,10 +24,9 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import Factorisation, UpperTriangle, nearly_singular, svd
-from ...linalg.definite import STEPS
+from ...linalg import UpperTriangle, nearly_singular
 from ...nodes.nodal import NodalMatrix
-from ...nodes.shape import MOST_FIELDS
+from ...nodes.shape import least_fields, singular
 from ...tolerances import ALIKE, LITTLE, SMALL
 from .identities import Identities, identities
 
@@ -62,9 +61,8 @@ def null_fields(
         local = of(part)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
-    _, values, v = svd(triangle)
-    fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
-    return Fields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))
+    flat, values = singular(triangle, fields.reshape(-1, k))
+    return Fields(nodes, flat.reshape(-1, d, k), values, sum(one.rows for one in made), len(made))
 
 
 def _joined(charts: list[Fields], n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -128,18 +126,23 @@ def _chart(of: Of, graph: sp.csr_array, rows: NDArray[np.int64], *, whole: bool)
     n, d = len(local.columns), local.dim
     if not n:
         return Fields(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
-    count = min(4 * d, n * d)
     with nearly_singular(UpperTriangle.of(local.normal_matrix())) as solver:
-        while True:
-            fields, values = _least_fields(local, solver, count)
-            if count == n * d or count >= MOST_FIELDS or values[-1] > (ALIKE if whole else SMALL):
-                break
-            count = min(2 * count, n * d)
+        flat, values = least_fields(partial(_residuals, local), solver, n * d, d, ALIKE if whole else SMALL)
         if not whole:
-            keep = values < LITTLE
-            fields, values = fields[..., keep], values[keep]
-        fields, values = _refined(local, solver, fields, values)
-    return Fields(local.columns, fields, values, own)
+            flat, values = flat[:, values < LITTLE], values[values < LITTLE]
+        # One step in correction form: its error is that of the residual, not of the factor.
+        null = values < ALIKE
+        if null.any():
+            gradient = local.gradient(local.residual(flat[:, null].reshape(n, d, -1)))
+            flat[:, null] -= solver.solve(gradient.reshape(n * d, -1))
+            flat = np.linalg.qr(flat)[0]
+        flat, values = singular(_residuals(local, flat), flat)
+    return Fields(local.columns, flat.reshape(n, d, -1), values, own)
+
+
+def _residuals(local: Identities, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, k) residuals of fields (n d, k)."""
+    return local.residual(x.reshape(len(local.columns), local.dim, -1)).reshape(-1, x.shape[1])
 
 
 def _supported(local: Identities, of: Of, graph: sp.csr_array) -> Identities:
@@ -162,34 +165,6 @@ def _short(local: Identities) -> NDArray[np.bool_]:
     """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
     touching = np.bincount(local.indices, minlength=len(local.columns))
     return np.asarray(np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) > local.equations)
-
-
-def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:
-    """Inverse iteration on a block of fields, then Rayleigh-Ritz on squares: values to half the digits."""
-    n, d = len(local.columns), local.dim
-    x = np.random.default_rng(0).standard_normal((n * d, count))
-    for _ in range(STEPS):
-        x = np.linalg.qr(solver.solve(x))[0]
-    residual = local.residual(x.reshape(n, d, -1)).reshape(-1, count)
-    squares, v = scipy.linalg.eigh(residual.T @ residual)
-    return (x @ v).reshape(n, d, -1), np.sqrt(np.maximum(squares, 0))
-
-
-def _refined(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """One step of inverse iteration in correction form: its error is that of the residual, not of the factor.
-
-    Fields are rotated to singular ones by residuals, not by their squares, which keeps all digits.
-    """
-    n, d, k = fields.shape
-    null = values < ALIKE
-    if null.any():
-        gradient = local.gradient(local.residual(fields[..., null]))
-        fields = fields.copy()
-        fields[..., null] -= solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
-        fields = np.linalg.qr(fields.reshape(n * d, k))[0].reshape(n, d, k)
-    _, values, v = svd(np.linalg.qr(local.residual(fields).reshape(-1, k), mode="r"))
-    values = np.concatenate([values, np.zeros(k - len(values))])
-    return (fields.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
 
 
 def _patches(graph: sp.csr_array, nodes: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
