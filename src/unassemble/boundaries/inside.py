@@ -19,7 +19,7 @@ from .rim import Rim
 _log = logging.getLogger(__name__)
 
 
-_MOST = 0.995  # of the entries, that are enough
+_MOST = 0.992  # of the entries, that are enough
 _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
