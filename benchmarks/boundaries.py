@@ -170,8 +170,7 @@ def bound(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:
         if not (rim.whole & fits).any():
             continue
         problem = WholeEntries(piece, -given.entries[piece.edge_rows], np.zeros(len(fits), dtype=bool))
-        known += int(determined(problem, z, 1.0, rim.whole & fits)[0].sum())
-        problem.release()
+        known += int(determined(problem, z, np.ones(1), rim.whole & fits)[0].sum())
     share = known / given.n
     return share, 0.0, f"{given.n:6d} rows   {share:5.0%}"
 

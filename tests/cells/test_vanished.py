@@ -4,8 +4,7 @@ import networkx
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from families import integer
 from meshes import SHARED, largest_error, largest_error_of_pieces, needs_shared, random_mesh, specimen, triangle_set

@@ -13,8 +13,7 @@ from unassemble import recover
 from unassemble.nodes import with_exact_sums
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "structures"))
-from built import error as size_and_error
-from built import frame, plane_frame, truss
+from built import error as size_and_error, frame, plane_frame, truss
 
 ROUNDED = {
     "single precision": lambda values: values.astype(np.float32).astype(float),

@@ -21,8 +21,7 @@ from assembled import (
     with_identity,
     with_penalty,
 )
-from supported import given as held
-from supported import judged
+from supported import given as held, judged
 
 from unassemble.errors import FormatError, GeometryError, RecoveryError
 from unassemble.modes import rigid_body_modes, save_amgcl_coordinates, save_petsc_vec

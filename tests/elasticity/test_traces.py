@@ -18,4 +18,4 @@ def test_cells_with_nodes_that_have_no_coordinates_are_left_out():
     assert 0 < len(left.blocks["quad"]) < len(cells.blocks["quad"])
     assert some[left.blocks["quad"]].all()
     assert len(left.lame) == len(left.blocks["quad"])
-    assert not cells.among(~np.ones_like(some)).recognised
+    assert not cells.among(~np.ones_like(some)).blocks

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from unassemble.errors import InputError, MatrixError
 from unassemble.matrix import OperatorMatrix, check_matrix

@@ -19,8 +19,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from handmade import lake, solid
 from unassemble.errors import InputError, MatrixFileError, OutputError, UnassembleError

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from unassemble.errors import MatrixError, MatrixFileError, UnassembleError
 from unassemble.matrix import read_matrix

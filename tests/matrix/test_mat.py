@@ -12,8 +12,7 @@ import pytest
 import scipy.io
 import scipy.io.matlab
 import scipy.sparse as sp
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from unassemble.errors import MatrixFileError
 from unassemble.matrix import read_matrix

@@ -7,8 +7,7 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from click.testing import CliRunner
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from meshes import delaunay, largest_error, random_mesh, specimen
 from unassemble import NotPlanarError, RecoveryError, recover

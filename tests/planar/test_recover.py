@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from meshes import delaunay, largest_error, random_mesh, specimen, triangle_set
 from unassemble import GeometryError, InputError, NotPlanarError, recover

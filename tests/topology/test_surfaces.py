@@ -6,8 +6,7 @@ import sys
 import networkx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay
 
 from meshes import delaunay, edge_list, random_mesh, triangle_set

@@ -27,7 +27,7 @@ from ..planar.polish import PolishOptions, polish
 from ..recovery import ConformingMesh
 from ..scalar.held import held
 from ..scalar.placement import Placement
-from ..tolerances import ALIKE, CERTIFIED, LITTLE, ROUNDED, SMALL
+from ..tolerances import ALIKE, LITTLE, ROUNDED, SMALL
 from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
 from .fit import EXACT
@@ -85,7 +85,7 @@ def _report(
     """The mesh, if it is certified."""
     own = [fit.fit for fit in fits]
     topology = Topology(matrix.n, matrix.edges, tuple(one.part.piece for one in own), "cliques")
-    told = [(fit.fit.part.piece.vertices, fit.known_nodes) for fit in fits]
+    told = [(fit.fit.part.piece.vertices, fit.nodes) for fit in fits]
     placement, said = placement.upon(topology, [known for _, known in told])
     with clock("place"):
         placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
@@ -94,16 +94,14 @@ def _report(
         mesh = replace(mesh, points=mesh.points + np.column_stack([shift.real, shift.imag]))
     status = node_status(mesh.component, told)
     with clock("certify"):
-        found = held(matrix, mesh, placement.coefficients)
         pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
-        key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
-        error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
-        free = 1 if options.scale is None else 0
-        spare = min(int((fit.used & fit.judged).sum()) - unknowns(fit.known, free) for fit in fits if fit.known.any())
+        spare = min(fit.spare for fit in fits if fit.known.any())
         claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.cells.values()])
-    if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
+        found = held(matrix, mesh, placement.coefficients)
+        verdict = partly(status, found, claimed, pairs, spare, bars=options.standard_deviations)
+    if verdict is None:
         return None
-    fields, loose = partly(status, len(pairs), error, bars=options.standard_deviations)
+    fields, loose = verdict
     return replace(
         mesh,
         **fields,
@@ -118,22 +116,9 @@ class FittedPart:
 
     fit: Fitted
     known: NDArray[np.bool_]  # (corners,) that are determined
-    whole: NDArray[np.bool_]  # (e,) pairs of the part
-    used: NDArray[np.bool_]  # (e,) that determine and check what is known
-    twins: NDArray[np.bool_]  # (n,) nodes that could change places with another one
-
-    @property
-    def known_nodes(self) -> NDArray[np.bool_]:
-        """(n,) nodes between known corners that are told from each other."""
-        return np.asarray((self.fit.part.from_corners() @ ~self.known == 0) & ~self.twins)
-
-    @property
-    def judged(self) -> NDArray[np.bool_]:
-        """(e,) whole entries of cells whose corners are all known."""
-        loose = np.zeros(len(self.whole), dtype=bool)
-        for kind, cells in self.fit.part.blocks.items():
-            loose[self.fit.part.places[kind][~self.known[cells[:, : kind.corners]].all(axis=1)]] = True
-        return self.whole & ~loose
+    nodes: NDArray[np.bool_]  # (n,) between known corners, and told from each other
+    judged: NDArray[np.bool_]  # (e,) whole entries of cells whose corners are all known
+    spare: int  # how many of them are not needed to determine what is known
 
 
 def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], scale: float | None) -> FittedPart | None:
@@ -155,11 +140,10 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
             start, c = corner_positions(part, guess, None)  # the energy of guesses is not that of c
         except (GeometryError, SolverError):
             continue
-        rules = list(by_rule(part, guess, start, c))  # much alike: which it is shows near the end
+        rules = list(by_rule(part, guess, start, c))
         begun = _faded(rules[0], whole, _AT_FIRST, scale)
-        trials = [_faded(replace(begun, entries=one.entries, rule=one.rule), whole, _THEN[:1], scale) for one in rules]
-        for near_end in sorted(trials, key=lambda one: _size(one, whole))[:2]:
-            fit = _faded(near_end, whole, _THEN, scale)
+        for one in rules:
+            fit = _faded(replace(begun, entries=one.entries, rule=one.rule), whole, _THEN, scale)
             if not _size(fit, whole) <= EXACT or not (fit.entries.areas(fit.z) > 0).all():
                 continue
             w = fit.entries.weights(fit.z)
@@ -168,7 +152,11 @@ def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], sca
             known, used, _ = determined_by(jacobian, slopes, whole, fit.z, part.piece, fit.misfit / fit.scale)
             twins = _twins(part, weights / fit.scale, whole, near[part.piece.vertices])
             known &= ~twins[: part.n_corners]
-            return FittedPart(fit, known, whole, used, twins)
+            judged = whole.copy()
+            for kind, cells in part.blocks.items():
+                judged[part.places[kind][~known[cells[:, : kind.corners]].all(axis=1)]] = False
+            spare = int((used & judged).sum()) - unknowns(known, 1 if scale is None else 0)
+            return FittedPart(fit, known, (part.from_corners() @ ~known == 0) & ~twins, judged, spare)
     return None
 
 

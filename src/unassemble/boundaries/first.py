@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..errors import GeometryError, SolverError
-from ..linalg import UpperTriangle, factorisation
+from ..linalg import solved
 from ..planar.conformal import conformal_map, estimate_scale
 from ..planar.cotangent import areas
 from ..topology import Piece
@@ -18,32 +18,47 @@ from .fit import Fit, FitOptions, WholeEntries
 from .patch import distance, fit_near
 from .rim import Rim
 
-# Weights of the prior, one after the other, and once more.
-_FADING = (0.1, 0.01, 1e-3, 0.0)
 LARGE = 20_000  # vertices: from there on a step of all of them costs more than what it brings to the first of these
-SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)  # weights of the prior, one after the other
+FADING: Sequence[float] = (0.1, 0.01, 1e-3, 0.0)
 
 
-def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[tuple[Fit, bool]]:
-    """Fits, one after the other, each with whether it started so near that the rim alone needed more than one step.
+def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[Fit]:
+    """Fits, one after the other, steps `newton` being those of all vertices of a large mesh.
 
-    Steps `newton` are those of all vertices of a large mesh.
+    Few entries at the rim may have several solutions, and which of them a fit comes to is decided by what is guessed
+    there: the last start has it at random.
     """
-    conformal = nearest_conformal(problem, rim)
-    fit = _settled(problem, rim, conformal, newton)
+    near = nearest_conformal(problem, rim)
+    fit = _settled(problem, rim, near, newton)
     if fit is not None:
-        yield fit, True
-    for fading, start in ((_FADING, conformal), (SLOWLY, None))[fit is not None :]:
+        yield fit
+    anew = nearest_conformal(problem, rim, np.random.default_rng(1))
+    for fading, start in ((FADING, near), (SLOWLY, None), (FADING, anew))[fit is not None :]:
         first = _start(problem, rim, fading[0], start)
         if first is not None:
-            yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False
+            yield problem.faded(first.z, first.scale, rim.whole, fading[1:])
 
 
-def nearest_conformal(problem: WholeEntries, rim: Rim) -> NDArray[np.complex128]:
-    """(n,) the conformal map of entries that are whole or guessed; 0 where there is none."""
+def nearest_conformal(
+    problem: WholeEntries, rim: Rim, rng: np.random.Generator | None = None
+) -> NDArray[np.complex128]:
+    """(n,) the conformal map of entries that are whole or guessed, at random if so; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    c = estimate_scale(problem.piece, given)
-    return _conformal(problem, guessed(problem.piece, given, rim.given, c))
+    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
+    if rng is not None:
+        weights = np.where(rim.given, weights, weights * rng.lognormal(sigma=0.6, size=len(weights)))
+    return conformal(problem.piece, weights, None if problem.known_scale is None else float(problem.known_scale[0]))
+
+
+def conformal(piece: Piece, weights: NDArray, scale: float | None) -> NDArray[np.complex128]:
+    """(n,) the conformal map of weights (e,), its triangles of mean area 1/2; 0 where there is none."""
+    try:
+        z = conformal_map(piece, weights, scale=scale, sharp=False, most=2).z
+    except (GeometryError, SolverError):
+        return np.zeros(piece.n_vertices, dtype=np.complex128)
+    area = float(areas(piece, z).mean())
+    return np.asarray((z if area > 0 else np.conj(z)) / np.sqrt(abs(area)))
 
 
 def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], c: float) -> NDArray[np.float64]:
@@ -61,10 +76,10 @@ def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], 
 def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) -> Fit | None:
     """A fit from near, in a large mesh: steps of the rim by itself and of all vertices in turn."""
     band = distance(problem.piece, rim.opened, 5) <= 5
-    if 2 * band.sum() >= len(band) or not _upright(problem.piece, z):
+    if 2 * band.sum() >= len(band) or not upright(problem.piece, z):
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
-    first, second, third = ((mu, 3) for mu in _FADING[:-1])
+    first, second, third = ((mu, 3) for mu in FADING[:-1])
     large = problem.piece.n_vertices >= LARGE
     for turn in ([first, second], [third]) if large else ([first], [second], [third]):
         z = fit_near(problem, fit.z, fit.scale, rim.whole, band, turn)
@@ -72,42 +87,32 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
     return fit
 
 
-def _start(problem: WholeEntries, rim: Rim, weight: float, conformal: NDArray | None) -> Fit | None:
+def _start(problem: WholeEntries, rim: Rim, weight: float, near: NDArray | None) -> Fit | None:
     """The best first fit from drawings without crossings.
 
     The conformal map of guessed entries is the nearest one, if its ring is not inside out; where it turns triangles
     over, or there are several loops, drawings with one or another of them as the outline are tried.
     """
     piece, whole, best, least = problem.piece, rim.whole, None, np.inf
-    drawings: Iterable[NDArray[np.complex128]] = [] if conformal is None else [conformal]
-    if piece.n_loops > 1 or not any(map(partial(_upright, piece), drawings)):
+    drawings: Iterable[NDArray[np.complex128]] = [] if near is None else [near]
+    if piece.n_loops > 1 or not any(map(partial(upright, piece), drawings)):
         loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[:4]
         drawings = chain(drawings, (tutte(piece, loop) for loop in loops.tolist()))
     for z in drawings:
         if best is not None and best.misfit <= 0.01:
             break
-        if not _upright(piece, z):
+        if not upright(piece, z):
             continue
         c = problem.best_scale(z, whole)
-        fit = problem.fit(z, c if c > 0 else 1.0, whole, weight, FitOptions(steps=40, damping=1e-2))
+        fit = problem.fit(z, np.where(c > 0, c, 1.0), whole, weight, FitOptions(steps=40, damping=1e-2))
         cost = whole.sum() * fit.misfit**2 + (weight * fit.prior) ** 2
         if cost < least:
             best, least = fit, cost
     return best
 
 
-def _conformal(problem: WholeEntries, weights: NDArray) -> NDArray[np.complex128]:
-    """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
-    piece = problem.piece
-    try:
-        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False, most=2).z
-    except (GeometryError, SolverError):
-        return np.zeros(piece.n_vertices, dtype=np.complex128)
-    area = float(areas(piece, z).mean())
-    return np.asarray((z if area > 0 else np.conj(z)) / np.sqrt(abs(area)))
-
-
-def _upright(piece: Piece, z: NDArray) -> bool:
+def upright(piece: Piece, z: NDArray) -> bool:
+    """Whether no triangle is turned over."""
     return bool((areas(piece, z) > 0).all())
 
 
@@ -131,24 +136,12 @@ def tutte(piece: Piece, outline: int) -> NDArray[np.complex128]:
     z[circle] = np.exp(2j * np.pi * np.arange(len(circle)) / len(circle))
     free = np.ones(number, dtype=bool)
     free[circle] = False
-    z = relaxed(np.concatenate(ends), z, free)[:n]
-    area = areas(piece, z)
-    return np.asarray((z if area.sum() > 0 else np.conj(z)) / np.sqrt(np.abs(area).mean()))
-
-
-def relaxed(edges: NDArray, z: NDArray[np.complex128], free: NDArray[np.bool_]) -> NDArray[np.complex128]:
-    """The same positions (n,), those that are `free`, (n,) bool, at the means of their neighbours.
-
-    `edges` (e, 2) may repeat one, as a loop does that comes to a vertex twice. Raises SolverError.
-    """
-    graph = sp.coo_array((np.ones(len(edges)), edges.T), shape=(len(z), len(z))).tocsr()
+    both = np.concatenate(ends)  # may repeat one, as a loop does that comes to a vertex twice
+    graph = sp.coo_array((np.ones(len(both)), both.T), shape=(number, number)).tocsr()
     laplacian = sp.csr_array(csgraph.laplacian(graph + graph.T))[free]
     if free.any():
-        matrix = UpperTriangle.of(sp.csr_array(laplacian[:, free]))
-        solver = factorisation(matrix, definite=True)
-        solver.factorise(matrix)
         pull = -(laplacian[:, ~free] @ z[~free])
-        z = z.copy()
-        z[free] = np.ascontiguousarray(solver.solve(np.column_stack([pull.real, pull.imag]))) @ np.array([1, 1j])
-        solver.release()
-    return z
+        z[free] = solved(sp.csr_array(laplacian[:, free]), np.column_stack([pull.real, pull.imag])) @ [1, 1j]
+    z = z[:n]
+    area = areas(piece, z)
+    return np.asarray((z if area.sum() > 0 else np.conj(z)) / np.sqrt(np.abs(area).mean()))

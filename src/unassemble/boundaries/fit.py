@@ -6,8 +6,8 @@ Minimised is
 
 a_e = -A_ij. The prior holds what few entries hold, and fades: each mu starts where the one before has ended, the last
 is zero. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
-triangle turns over. Where regions have factors of their own, both sides of a_e = c w_e(z) have them: misfits are those
-of a_e, and of half a cotangent times its region's factor from each triangle, in units of the mean of these factors.
+triangle turns over. Regions may have factors of their own: then misfits are those of a_e, and of half a cotangent times
+its region's factor from each triangle, in units of the mean of these factors.
 
 References
 ----------
@@ -19,7 +19,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,7 +32,6 @@ from .shape import ShapePrior
 
 _log = logging.getLogger(__name__)
 
-Scale = Any  # float, or (k,) float64 where there are regions
 EXACT = 1e-12  # root mean square misfit of whole entries that is none, in units of typical ones
 
 
@@ -55,7 +53,7 @@ class Fit:
     """Where the iteration has ended."""
 
     z: NDArray[np.complex128]
-    scale: Scale
+    scale: NDArray[np.float64]  # (k,) c of each region
     misfit: float  # root mean square of a / c - w over whole entries
     prior: float  # root of the sum of squares of the prior
 
@@ -64,17 +62,17 @@ class WholeEntries:
     """The problem on one piece; the pattern of its normal matrix is analysed once.
 
     Given are -A_ij of each edge (e,), of any size where entries are not whole; (e,) bool, weights that are about right
-    where they are not whole, which count as the prior does; c, where it is known; vertices (n,) bool that move, where
-    all others stay, and entries of these alone are left out; and the region of each triangle, where regions have
-    factors of their own.
+    where they are not whole, which count as the prior does; c (k,), where it is known; vertices (n,) bool that move,
+    where all others stay, and entries of these alone are left out; and the region of each triangle, all the same one by
+    default.
     """
 
     def __init__(
-        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: Scale | None = None,
+        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: NDArray | None = None,
         free: NDArray[np.bool_] | None = None, region: NDArray[np.int64] | None = None,
     ):  # fmt: skip
         self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
-        self.region: Any = region  # an array wherever it is used
+        self.region = np.zeros(len(piece.triangles), np.int64) if region is None else region
         self.free = np.ones(piece.n_vertices, dtype=bool) if free is None else free
         self.asked = self.free[piece.stencil].any(axis=0)
         count = int(self.free.sum())
@@ -88,47 +86,34 @@ class WholeEntries:
             self._factor = factorisation(matrix, definite=True)
         return self._factor
 
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        if self._factor is not None:
-            self._factor.release()
-        self._factor = None
-
-    def best_scale(self, z: NDArray, whole: NDArray[np.bool_]) -> float:
-        """c that fits positions best."""
+    def best_scale(self, z: NDArray, whole: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(1,) c that fits positions best, where all have the same."""
         if self.known_scale is not None:
             return self.known_scale
         w, a = edge_weights(self.piece, z)[whole], self.weights[whole]
-        return float(w @ a / (w @ w))
+        return np.array([w @ a / (w @ w)])
 
-    def misfits(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
+    def misfits(self, z: NDArray, scale: NDArray) -> NDArray[np.float64]:
         """(e,) a / c - w."""
-        if self.region is None:
-            return np.asarray(self.weights / scale - edge_weights(self.piece, z))
         return np.asarray((self.weights - edge_weights(self.piece, z, scale[self.region])) / self.unit(scale))
 
-    def gradient(self, z: NDArray, scale: Scale) -> NDArray[np.complex128]:
+    def gradient(self, z: NDArray, scale: NDArray) -> NDArray[np.complex128]:
         """(4, e) as :func:`..planar.cotangent.weight_gradient` has it."""
-        if self.region is None:
-            return weight_gradient(self.piece, z)
         return weight_gradient(self.piece, z, scale[self.region]) / self.unit(scale)
 
-    def slopes(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
+    def slopes(self, z: NDArray, scale: NDArray) -> NDArray[np.float64]:
         """(e, k) what misfits change by with -log c, of each region; no columns where c is known."""
         if self.known_scale is not None:
             return np.zeros((len(self.weights), 0))
-        if self.region is None:
-            return np.asarray(self.weights / scale)[:, None]
-        sides = self.piece.opposite
-        part = halves(self.piece, z) * scale[self.region][:, None] / self.unit(scale)[sides]
+        sides, unit = self.piece.opposite, self.unit(scale)
+        with_unit = self.misfits(z, scale) / (self.piece.inner + 1)
+        part = (halves(self.piece, z) + with_unit[sides]) * scale[self.region][:, None] / unit[sides]
         place = sides.ravel(), np.repeat(self.region, 3)
         return sp.coo_array((part.ravel(), place), shape=(len(self.weights), len(scale))).toarray()
 
-    def _scaled(self, scale: Scale, move: NDArray) -> Scale:
+    def _scaled(self, scale: NDArray, move: NDArray) -> NDArray[np.float64]:
         """Factors whose logarithms have changed; where c is known it stays."""
-        if self.known_scale is not None:
-            return scale
-        return scale * np.exp(move) if self.region is not None else scale * float(np.exp(move[0]))
+        return scale if self.known_scale is not None else scale * np.exp(move)
 
     def unit(self, scale: NDArray) -> NDArray[np.float64]:
         """(e,) the mean of c on both sides of each edge."""
@@ -136,7 +121,7 @@ class WholeEntries:
         return np.asarray(np.where(self.piece.inner, (one + other) / 2, one))
 
     def fit(
-        self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
+        self, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
     ) -> Fit:
         """Improve positions in which no triangle is turned over; sides of other entries have a prior of weight mu."""
         options = options or FitOptions()
@@ -182,7 +167,7 @@ class WholeEntries:
     def moved(self, fit: Fit, whole: NDArray[np.bool_], step: NDArray[np.complex128]) -> Fit:
         """Positions displaced by a step (n,), with the factors that are best then, if whole entries fit no worse."""
 
-        def misfit(z: NDArray, scale: Scale) -> NDArray:
+        def misfit(z: NDArray, scale: NDArray) -> NDArray:
             return np.where(whole, self.misfits(z, scale), 0.0)
 
         z = fit.z + step
@@ -191,7 +176,7 @@ class WholeEntries:
         better = np.linalg.norm(misfit(z, scale)) < np.linalg.norm(misfit(fit.z, fit.scale))
         return replace(fit, z=z, scale=scale) if better else fit
 
-    def faded(self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+    def faded(self, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
         """One fit after the other, with less and less prior."""
         for mu in mus:
             found = self.fit(z, scale, whole, mu)
@@ -203,7 +188,7 @@ class WholeEntries:
         return np.where(whole, 1.0, min(10 * mu, 0.3) * (self.guessed & self.asked))
 
     def residuals(
-        self, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float
+        self, z: NDArray, scale: NDArray, whole: NDArray, prior: ShapePrior, mu: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Misfits of entries (e,) and of the prior, weighted."""
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
@@ -214,7 +199,6 @@ class WholeEntries:
         try:
             self.analysed(matrix).factorise(matrix)
         except SolverError:
-            self.release()
             return None
         system.response = None
         return self._solved(system)
@@ -237,9 +221,9 @@ class WholeEntries:
         return (step, move) if np.isfinite(step).all() and np.isfinite(move).all() else None
 
     def _along(
-        self, z: NDArray, scale: Scale, step: NDArray, move: NDArray, whole: NDArray, prior: ShapePrior, mu: float,
+        self, z: NDArray, scale: NDArray, step: NDArray, move: NDArray, whole: NDArray, prior: ShapePrior, mu: float,
         cost: float,
-    ) -> tuple[NDArray, Scale, NDArray, NDArray, float] | None:  # fmt: skip
+    ) -> tuple[NDArray, NDArray, NDArray, NDArray, float] | None:  # fmt: skip
         """The longest part of a step, of a few, that turns no triangle over and lowers the cost."""
         fitted = self.piece.triangles[(whole[self.piece.opposite] | (mu > 0)).any(axis=1)]
         flip = float(first_flips(fitted, z, step).min(initial=np.inf))
@@ -258,7 +242,7 @@ class System:
     """The linearised problem: normal matrix, right-hand side, and the columns of log c beside them."""
 
     def __init__(
-        self, problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float,
+        self, problem: WholeEntries, z: NDArray, scale: NDArray, whole: NDArray, prior: ShapePrior, mu: float,
         misfit: NDArray, shape: NDArray,
     ):  # fmt: skip
         piece, free = problem.piece, problem.free

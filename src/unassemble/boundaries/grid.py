@@ -10,7 +10,6 @@ is wide.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,13 +47,6 @@ class Grid:
         if not match.any(axis=1).all() or len(distinct(shifted)) < n:
             return None
         return cls(neighbours, at, match.argmax(axis=1))
-
-    def turned(self) -> Iterator[Grid]:
-        """The same with each direction of triangles in turn as that across two of them."""
-        at, step = self.at, self.step
-        for _ in range(3 if self.neighbours == 6 else 1):
-            yield Grid(self.neighbours, at, step)
-            at, step = at @ np.array([[1, -1], [1, 0]]), (step - 1) % 3
 
 
 def _common(graph: sp.csr_array) -> sp.csr_array:

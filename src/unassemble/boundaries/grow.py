@@ -2,8 +2,7 @@
 
 Vertices that whole entries tie to each other, and to others whose places are known, are known as well where these
 entries determine and check them: to first order, which shows before any of them is fitted, and by fitting. The smallest
-such sets come first, many at once, since they have nothing to do with each other. Each starts where its neighbours have
-taken it, and from random triangles where that leads to no end.
+such sets come first, many at once, since they have nothing to do with each other.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from ..planar.cotangent import areas, weight_roundings
 from ..tolerances import CERTIFIED
 from ..topology import Piece
-from .fit import Scale, WholeEntries
+from .fit import WholeEntries
 from .patch import fit_near
 
 _log = logging.getLogger(__name__)
@@ -27,17 +26,17 @@ Vertices = tuple[int, ...]  # in ascending order
 
 
 def grow(
-    problem: WholeEntries, z: NDArray[np.complex128], scale: Scale, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+    problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray, whole: NDArray[np.bool_], known: NDArray[np.bool_]
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Positions, and the vertices (n,) that are known with some, (n,) bool, such that whole entries (e,) fit."""
-    piece, first, held = problem.piece, z, known
-    rng, failed, idle = np.random.default_rng(1), set[Vertices](), 0
+    piece, held = problem.piece, known
+    failed, idle = set[Vertices](), 0
     while idle < 3:
         ties = _Ties.of(piece, problem.gradient(z, scale), whole, known)
         sets = ties.sets(failed)
         if not sets:
             break
-        there, more = _fitted(problem, _carried(piece, first, z, known, sets), scale, known, ties, sets, rng)
+        there, more = _fitted(problem, z, scale, known, ties, sets)
         among = whole & more[piece.stencil].all(axis=0)
         there = fit_near(problem, there, scale, among, more & ~held, ((0.0, 5),))  # errors would add up
         fits = np.abs(problem.misfits(there, scale)) <= 1e-12 * weight_roundings(piece, there)
@@ -133,65 +132,22 @@ def held(stencil: NDArray, gradient: NDArray, some: Vertices) -> Vertices:
 
 
 def _fitted(
-    problem: WholeEntries, start: NDArray, scale: Scale, known: NDArray[np.bool_], ties: _Ties, sets: list[Vertices],
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:  # fmt: skip
+    problem: WholeEntries, start: NDArray, scale: NDArray, known: NDArray[np.bool_], ties: _Ties, sets: list[Vertices]
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Positions, with those of sets that fit, and the vertices (n,) that are known then."""
     piece, z, known = problem.piece, start.copy(), known.copy()
-    for _ in range(6):
-        entries = {some: ties.within(some) for some in sets}
-        free, used = np.zeros(len(z), dtype=bool), np.zeros(len(piece.edges), dtype=bool)
-        free[np.concatenate(sets)] = True
-        used[np.concatenate(list(entries.values()))] = True
-        with np.errstate(all="ignore"):  # random triangles may lead far away
-            there = fit_near(problem, start, scale, used, free, ((1e-3, 5), (0.0, 20)))
-            fits = np.abs(problem.misfits(there, scale)) <= CERTIFIED * weight_roundings(piece, there)
-            gradient, area = problem.gradient(there, scale), areas(piece, there)
-        folded = np.zeros(len(z), dtype=bool)
-        folded[piece.triangles[(known | free)[piece.triangles].all(axis=1) & ~(area > 0)]] = True
-        sets = []
-        for some, own in entries.items():
-            if fits[own].all() and not folded[list(some)].any():
-                chosen = list(held(piece.stencil[:, own], gradient[:, own], some))
-                z[chosen], known[chosen] = there[chosen], True
-            else:
-                sets.append(some)
-        if not sets:
-            break
-        start = _drawn(piece, z, known, sets, rng)
+    entries = {some: ties.within(some) for some in sets}
+    free, used = np.zeros(len(z), dtype=bool), np.zeros(len(piece.edges), dtype=bool)
+    free[np.concatenate(sets)] = True
+    used[np.concatenate(list(entries.values()))] = True
+    with np.errstate(all="ignore"):  # those that fit nowhere may be led far away
+        there = fit_near(problem, start, scale, used, free, ((1e-3, 5), (0.0, 20)))
+        fits = np.abs(problem.misfits(there, scale)) <= CERTIFIED * weight_roundings(piece, there)
+        gradient, area = problem.gradient(there, scale), areas(piece, there)
+    folded = np.zeros(len(z), dtype=bool)
+    folded[piece.triangles[(known | free)[piece.triangles].all(axis=1) & ~(area > 0)]] = True
+    for some, own in entries.items():
+        if fits[own].all() and not folded[list(some)].any():
+            chosen = list(held(piece.stencil[:, own], gradient[:, own], some))
+            z[chosen], known[chosen] = there[chosen], True
     return z, known
-
-
-def _carried(
-    piece: Piece, first: NDArray, z: NDArray, known: NDArray[np.bool_], sets: list[Vertices]
-) -> NDArray[np.complex128]:
-    """Positions of sets as they were at first, moved as the vertices beside them that are known."""
-    z, label = z.copy(), np.full(len(z), -1)
-    for k, some in enumerate(sets):
-        label[list(some)] = k
-    here, there = np.concatenate([piece.edges, piece.edges[:, ::-1]]).T
-    beside = (label[here] >= 0) & known[there]
-    here, there = here[beside], there[beside]
-    for k, some in enumerate(sets):
-        near = there[label[here] == k]
-        turn, shift = np.linalg.lstsq(np.column_stack([first[near], np.ones(len(near))]), z[near], rcond=None)[0]
-        z[list(some)] = turn * first[list(some)] + shift
-    return z
-
-
-def _drawn(
-    piece: Piece, z: NDArray, known: NDArray[np.bool_], sets: list[Vertices], rng: np.random.Generator
-) -> NDArray[np.complex128]:
-    """Positions of sets in random triangles, one after the other, from sides that are known."""
-    z, placed, left = z.copy(), known.copy(), np.concatenate(sets)
-    corners = piece.triangles[np.isin(piece.triangles, left).any(axis=1)]
-    turned = np.concatenate([np.roll(corners, turn, axis=1) for turn in range(3)])
-    while len(left):
-        v, a, b = turned[np.isin(turned[:, 0], left) & placed[turned[:, 1:]].all(axis=1)].T
-        if not len(v):
-            break
-        shape = 1j * np.pi / 3 + 0.4 * (rng.standard_normal((len(v), 2)) @ [1, 1j])
-        z[v] = z[a] + (z[b] - z[a]) * np.exp(shape)
-        placed[v] = True
-        left = left[~placed[left]]
-    return z

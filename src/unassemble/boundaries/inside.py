@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
-from .first import LARGE, first_fits, nearest_conformal
+from .first import FADING, LARGE, first_fits, nearest_conformal
 from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .grow import grow
 from .judge import determined, unknowns
 from .lengths import fit_lengths
-from .patch import distance, fit_anew, fit_near, moved_along
+from .patch import distance, fit_near, moved_along
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
 
 
-_MOST = 0.99  # of the entries, that are enough
+_MOST = 0.992  # of the entries, that are enough
 _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
@@ -37,8 +37,7 @@ class InsideMesh:
     region: NDArray[np.int64]  # (m,)
     given: NDArray[np.bool_]  # (e,) entries that were said to be whole
     entries: NDArray[np.bool_]  # (e,) those that determine and check vertices
-    exact: bool  # whether all that were fitted fit
-    determined: NDArray[np.bool_]  # (n,) vertices, up to a similarity of all; none where entries do not fit
+    determined: NDArray[np.bool_]  # (n,) vertices, up to a similarity of all
 
     @property
     def factor(self) -> NDArray[np.float64]:
@@ -51,14 +50,9 @@ class PieceEntries:
     """What a matrix says of a piece."""
 
     piece: Piece
-    weights: NDArray[np.float64]  # (e,) -A_ij
+    weights: NDArray[np.float64]  # (e,) -A_ij, half of it where it is shared, which is a guess
     whole: NDArray[np.bool_]  # (e,) entries that are those of the piece's triangles and of no others
     shared: NDArray[np.bool_]  # (e,) those with another triangle besides, which is gone
-
-    @property
-    def halved(self) -> NDArray[np.float64]:
-        """(e,) weights, of which half is a guess where they are shared."""
-        return np.where(self.shared, self.weights / 2, self.weights)
 
 
 def fit_inside(given: PieceEntries, scale: float | None = None) -> InsideMesh | None:
@@ -69,87 +63,71 @@ def fit_inside(given: PieceEntries, scale: float | None = None) -> InsideMesh | 
     if not unit:
         return None
     unit *= 1 if weights[rim.whole].sum() > 0 else -1
-    halved = given.halved / unit
-    likely = given.shared & (halved > 0) & (halved < 3.0)  # others have terms of another kind
-    problem = WholeEntries(piece, halved, whole | likely, None if scale is None else scale / unit)
-    try:
-        core = _core(problem, rim)
-        if core is None:
-            return None
-        return finished(problem, *core, unit)
-    finally:
-        problem.release()
+    weights = weights / unit
+    likely = given.shared & (weights > 0) & (weights < 3.0)  # others have terms of another kind
+    problem = WholeEntries(piece, weights, whole | likely, None if scale is None else np.array([scale / unit]))
+    core = _core(problem, rim)
+    return None if core is None else finished(problem, *core, unit)
 
 
-def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh:
-    """A fit with what fits of the vertices taken off, and its verdict; c was in this unit."""
-    exact = fit.misfit <= EXACT
-    if exact:
-        enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
-        before, held = 0, rim.inside
-        while before < rim.whole.sum() < enough:  # from a larger core to one larger still
-            if before:
-                held = determined(problem, fit.z, fit.scale, rim.whole)[0]
-            before = rim.whole.sum()
-            fit, rim = _grown(problem, fit, rim, held)
-        if rim.whole.sum() < enough:
-            fit, rim = _grown_by_sets(problem, fit, rim)
-    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
-    if exact:
-        known, entries, step = determined(problem, fit.z, fit.scale, rim.whole)
-        fit = problem.moved(fit, rim.whole, step)  # what is left is rounding
-    scale, region = np.atleast_1d(fit.scale) * unit, problem.region
-    region = np.zeros(len(problem.piece.triangles), np.int64) if region is None else region
-    if entries.sum() <= unknowns(known, 0 if problem.known_scale is not None else len(scale)):
+def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh | None:
+    """A fit with what fits of the vertices taken off, and its verdict; c was in this unit. None where it is no fit."""
+    if not fit.misfit <= EXACT:
+        return None
+    enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
+    before, held = 0, rim.inside
+    while before < rim.whole.sum() < enough:  # from a larger core to one larger still
+        if before:
+            held = determined(problem, fit.z, fit.scale, rim.whole)[0]
+        before = rim.whole.sum()
+        fit, rim = _grown(problem, fit, rim, held)
+    if rim.whole.sum() < enough:
+        fit, rim = _grown_by_sets(problem, fit, rim)
+    known, entries, step = determined(problem, fit.z, fit.scale, rim.whole)
+    fit = problem.moved(fit, rim.whole, step)  # what is left is rounding
+    if entries.sum() <= unknowns(known, 0 if problem.known_scale is not None else len(fit.scale)):
         known, entries = np.zeros_like(known), np.zeros_like(entries)  # nothing checks them as a whole
-    return InsideMesh(fit.z, scale, region, rim.given, entries, exact, known)
+    return InsideMesh(fit.z, fit.scale * unit, problem.region, rim.given, entries, known)
 
 
 def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
-    for again, (fit, near) in enumerate(first_fits(problem, rim, _NEWTON)):
-        # What comes to a bad end with one part of the largest misfit for peaks often does not with another. A small
-        # mesh loses more of its rim where that is taken off as a whole, and is peeled a few times before.
-        found = shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
+    for again, fit in enumerate(first_fits(problem, rim, _NEWTON)):
+        # What comes to a bad end with one part of the largest misfit for peaks often does not with another.
+        found = shrunk(problem, rim, fit, 0.35 if again else 0.25)
         if found[0].misfit <= EXACT:
             return found
     flat = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
     return flat if flat is not None and flat[0].misfit <= EXACT else found
 
 
-def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, newton: FitOptions) -> tuple[Fit, Rim] | None:
+def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim] | None:
     """A fit without the vertices of the rim, which bend nothing then; None where few entries are left, or it fails."""
-    bare, found = rim.bared(), fit
+    bare: Rim | None = rim.bared()
+    start = fit.z
     for _ in range(_ROUNDS):
-        if bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, far inside there are three
-            return None
-        found = problem.fit(found.z, found.scale, bare.whole, 0.0, newton)
-        if found.misfit <= EXACT:
+        if bare is None or bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, inside are three
             break
-        less = _less(problem, bare, found, peaks)
-        if less is None:
-            return None
-        bare = less
-    else:
-        return None
-    return replace(found, z=moved_along(problem.piece, fit.z, found.z, bare.inside)), bare
+        fit = problem.fit(fit.z, fit.scale, bare.whole, 0.0, _STEP)
+        if fit.misfit <= EXACT:
+            return replace(fit, z=moved_along(problem.piece, start, fit.z, bare.inside)), bare
+        bare = _less(problem, bare, fit, peaks)
+    return None
 
 
-def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: float) -> tuple[Fit, Rim]:
-    """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
-    for turn in range(_ROUNDS):
+def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim]:
+    """Fits with fewer vertices at the rim each, until one has all whole entries, or has them without the rim."""
+    for _ in range(_ROUNDS):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
-        if turn < patience:
-            fit = _tried(problem, rim, fit, peaks)
-        elif fit.misfit > EXACT and (bare := _bare(problem, rim, fit, peaks, _NEWTON if patience else _STEP)):
-            return bare
         if fit.misfit <= EXACT:
             break
+        if bare := _bare(problem, rim, fit, peaks):
+            return bare
         less = _less(problem, rim, fit, peaks)
         if less is None or not (less := less.pruned()).whole.any():
             break
-        rim, fit = less, problem.faded(fit.z, fit.scale, less.whole, (0.03, 1e-3, 0.0))
+        rim, fit = less, problem.faded(fit.z, fit.scale, less.whole, FADING)
     return fit, rim
 
 
@@ -157,22 +135,6 @@ def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Rim | None
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
     return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)))
-
-
-def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
-    """A fit, from random triangles again and again where misfits are large, if that is in a few places."""
-    rng, first, tries = np.random.default_rng(1), fit.misfit, 6
-    for turn in range(tries):
-        misfit = np.where(rim.whole, np.abs(problem.misfits(fit.z, fit.scale)), 0.0)
-        places = np.isin(np.arange(len(fit.z)), problem.piece.edges[misfit > peaks * misfit.max()])
-        if fit.misfit <= EXACT or fit.misfit > 1e-3 or 4 * places.sum() > len(places):
-            break
-        if 2 * turn >= tries and 2 * fit.misfit > first:
-            break
-        z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
-        found = problem.fit(z, fit.scale, rim.whole, 0.0, _NEWTON)
-        fit = found if found.misfit < fit.misfit else fit
-    return fit
 
 
 def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) -> tuple[Fit, Rim]:

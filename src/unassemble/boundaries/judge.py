@@ -13,7 +13,6 @@ with one factorisation and no basis of all of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,16 +20,18 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from ..certify import Certificate
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
-from ..tolerances import ROUNDED
+from ..tolerances import CERTIFIED, ROUNDED
 from ..topology import Piece
+from ..topology.keys import pair_keys
 from ..words import count_of
-from .fit import Scale, WholeEntries, jacobian_rows
+from .fit import WholeEntries, jacobian_rows
 
 
 def determined(
-    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_]
+    problem: WholeEntries, z: NDArray, scale: NDArray, whole: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.complex128]]:
     """Vertices (n,), up to a similarity of all of them, and entries (e,) that determine and check them.
 
@@ -63,7 +64,7 @@ def determined_by(
     slopes = np.where(whole[:, None], slopes, 0.0)
     basis = np.linalg.qr(slopes[:, slopes.any(axis=0)])[0]
     try:
-        checked, free, step = _Linearised(scaled, basis, whole, held).judged(misfit * whole, analysed)
+        checked, free, step = _judged(scaled, basis, whole, held, misfit * whole, analysed)
     except GeometryError:
         checked, free, step = np.zeros_like(whole), np.zeros((n, 0), np.complex128), np.zeros(n, np.complex128)
     if not checked.any():
@@ -94,12 +95,21 @@ def node_status(component: NDArray[np.int64], parts: Sequence[tuple[NDArray, NDA
 
 
 def partly(
-    status: NDArray[np.int8], entries: int, error: float, told: str = "", *, bars: bool
-) -> tuple[dict[str, Any], list[str]]:
-    """What is said of a mesh that so many whole entries determine where status (n,) is 0, to a backward error."""
+    status: NDArray[np.int8], held: Certificate, claimed: NDArray[np.bool_], pairs: NDArray, spare: int,
+    told: str = "", *, bars: bool,
+) -> tuple[dict[str, Any], list[str]] | None:  # fmt: skip
+    """What is said of a mesh that whole entries at pairs (k, 2) determine where status (n,) is 0.
+
+    None unless it gives them back, some of them to `spare`, and no `claimed` cell, (m,) bool, is turned over.
+    """
+    n = len(status)
+    place = np.searchsorted(held.pairs @ [n, 1], pair_keys(n, *pairs.T))
+    error = float(held.misfits[place].max(initial=0.0))
+    if claimed[held.flipped].any() or not (error <= CERTIFIED and spare > 0):
+        return None
     known, plausible = int((status == 0).sum()), int((status == 2).sum())
     reason = (
-        f"{known:,} of {len(status):,} points are determined by {entries:,} whole entries, which the operator "
+        f"{known:,} of {len(status):,} points are determined by {len(pairs):,} whole entries, which the operator "
         f"re-assembled on them{told} gives back to {error:.1e} (relative)"
     )
     note = (
@@ -111,58 +121,52 @@ def partly(
     return fields | {"node_status": status, "backward_error": error}, notes
 
 
-@dataclass(frozen=True, eq=False)
-class _Linearised:
-    """J of some entries, in lengths of edges, and the columns of log c."""
+def _judged(
+    jacobian: sp.bsr_array, slope: NDArray, entries: NDArray[np.bool_], held: NDArray[np.bool_], misfit: NDArray,
+    analysed: Callable[[UpperTriangle], Factorisation] | None,
+) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:  # fmt: skip
+    """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-    jacobian: sp.bsr_array  # (e, 2 n), zero for other entries
-    slope: NDArray[np.float64]  # (e, k), an orthonormal basis
-    entries: NDArray[np.bool_]
-    held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
+    And (n,) those that leave least of a misfit (e,). `jacobian` (e, 2 n) is in lengths of edges, zero for all but some
+    `entries`, (e,) bool, and `slope` (e, k) an orthonormal basis of the columns of log c; vertices `held`, (n,) bool,
+    are those that some of the entries depend on.
 
-    def judged(
-        self, misfit: NDArray[np.float64], analysed: Callable[[UpperTriangle], Factorisation] | None
-    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:
-        """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
+    The inverse is that of J'J, made definite by a small shift: eigenvalues less than some hundred times as large
+    count as zero, so that a larger one, which slivers ask for, counts more as free. With c free its columns are
+    projected out, which is a matter of low rank.
+    """
+    transposed = jacobian.T.tobsr()
+    normal = UpperTriangle.of(transposed @ jacobian)
 
-        And (n,) those that leave least of a misfit (e,).
+    def without_slope(image: NDArray) -> NDArray[np.float64]:
+        return np.asarray(image - slope @ (slope.T @ image))
 
-        The inverse is that of J'J, made definite by a small shift: eigenvalues less than some hundred times as large
-        count as zero, so that a larger one, which slivers ask for, counts more as free. With c free its columns are
-        projected out, which is a matter of low rank.
-        """
-        transposed = self.jacobian.T.tobsr()
-        normal = UpperTriangle.of(transposed @ self.jacobian)
-        with nearly_singular(normal, analysed and analysed(normal)) as solver:
-            pull = transposed @ self.slope
-            response = solver.solve(pull) if pull.size else pull
-            left = self.slope.T @ self.slope - pull.T @ response
+    with nearly_singular(normal, analysed and analysed(normal)) as solver:
+        pull = transposed @ slope
+        response = solver.solve(pull) if pull.size else pull
+        left = slope.T @ slope - pull.T @ response
 
-            def preimage(y: NDArray) -> NDArray:
-                x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
-                return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
+        def preimage(y: NDArray) -> NDArray:
+            x = solver.solve(np.ascontiguousarray(transposed @ without_slope(y)))
+            return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
 
-            rng, probes = np.random.default_rng(1), 2
-            y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
-            x = preimage(np.column_stack([misfit, y]))
-            step = np.ascontiguousarray(x[:, 0]).view(np.complex128)
-            y = y - self.jacobian @ x[:, 1:]
-            for _ in range(2):  # what the shift leaves, and rounding
-                y = y - self.jacobian @ preimage(y)
-            y = self._without_slope(y)
-            checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
-            right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
-            x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
-            for _ in range(5):
-                change = preimage(right - self.jacobian @ x)
-                x = x + change
-                if np.abs(change).max() <= ROUNDED * np.abs(x).max():
-                    break
-            return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T, step
-
-    def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
-        """Columns (e, 2) less their components along the columns of log c."""
-        return np.asarray(image - self.slope @ (self.slope.T @ image))
+        rng, probes = np.random.default_rng(1), 2
+        y = rng.standard_normal((len(slope), probes)) * entries[:, None]
+        x = preimage(np.column_stack([misfit, y]))
+        step = np.ascontiguousarray(x[:, 0]).view(np.complex128)
+        y = y - jacobian @ x[:, 1:]
+        for _ in range(2):  # what the shift leaves, and rounding
+            y = y - jacobian @ preimage(y)
+        y = without_slope(y)
+        checked = entries & (np.abs(y).max(axis=1) > 1e-6)
+        right = rng.standard_normal(y.shape) * (entries & ~checked)[:, None]
+        x = rng.standard_normal((2 * len(held), probes)) * np.repeat(held, 2)[:, None]
+        for _ in range(5):
+            change = preimage(right - jacobian @ x)
+            x = x + change
+            if np.abs(change).max() <= ROUNDED * np.abs(x).max():
+                break
+        return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T, step
 
 
 def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: NDArray[np.bool_]) -> NDArray[np.bool_]:

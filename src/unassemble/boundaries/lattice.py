@@ -1,10 +1,7 @@
-"""A grid continued beyond the rows of the matrix: parallelograms in rows and columns, or halves of these.
+"""A grid continued beyond the rows of the matrix: parallelograms that are all alike, or halves of these.
 
-If G is c sqrt(det g) times the inverse of the metric g of a cell, then with steps h_i and k_j G11 = s k_j / h_i, G22 =
-s h_i / k_j and G12 = t, s and t the same in all cells, c^2 = s^2 - t^2. Entries are linear in G: diagonals give t, and
-an edge along x with half of all entries on diagonals beside it is -s (k_{j-1} + k_j) / (2 h_i), a product of what
-depends on i and on j. So is one along y; each gives steps up to a factor, which sums of two steps settle. Steps beyond
-the rows, and which cells there are, show in the entries along the rim.
+If G is c sqrt(det g) times the inverse of the metric g of a cell, entries are linear in G, whose determinant is c^2:
+those of edges along either axis and of diagonals give it. Which cells there are shows in the entries along the rim.
 """
 
 from __future__ import annotations
@@ -15,10 +12,9 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
-from ..tolerances import ALIKE, CERTIFIED, ROUNDED
+from ..tolerances import CERTIFIED, ROUNDED
 from ..topology.keys import Grouped, contains, distinct, found, pair_keys
 from .grid import Grid
 
@@ -69,34 +65,38 @@ class Lattice:
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:
-        """The lattice that a matrix may belong to; None where its graph is no grid, or no sizes of cells fit."""
+        """The lattice that a matrix may belong to; None where its graph is no grid, or cells are not alike."""
         vanished = np.abs(matrix.entries) <= ROUNDED * matrix.row_size[matrix.edges].min(axis=1)
         for stored in (matrix.without(vanished), *[matrix] * bool(vanished.any())):
             grid = Grid.of(matrix.n, stored.edges)
             if grid is not None:
-                return next((one for turned in grid.turned() if (one := cls._on(stored, turned)) is not None), None)
+                return cls._on(stored, grid)
         return None
 
     @classmethod
     def _on(cls, matrix: OperatorMatrix, grid: Grid) -> Lattice | None:
-        """The same on a grid; None where no sizes fit."""
+        """The same on a grid; None where its cells are not alike."""
         n, kind = matrix.n, _KINDS[grid.neighbours]
         at, cells = _around(grid.at, kind)
         one, other, direction = kind.pairs.T
         key = matrix.edges @ [len(at), 1]
         edge, stored = found(key, pair_keys(len(at), cells[:, one], cells[:, other]))
         edge = np.where(stored, edge, -1)
-        sizes = _sizes(matrix, grid, kind, edge[stored.all(axis=1)])
-        if sizes is None:
+        around = len(kind.corners) * np.bincount(direction)  # cells at an edge inside, by its direction
+        inside = np.bincount(edge[stored.all(axis=1)].ravel(), minlength=len(key)) == around[grid.step]
+        entries, step = matrix.entries[inside], grid.step[inside]
+        typical = np.array([np.median(entries[step == d]) if (step == d).any() else np.nan for d in range(len(around))])
+        if not (np.abs(entries - typical[step]) <= CERTIFIED * np.abs(entries)).all() or not np.isfinite(typical).all():
             return None
-        s, t, x, y = sizes
-        scale = float(np.sign(s) * np.sqrt(s**2 - t**2))
-        column, row = at.T
-        z = np.append(0, np.cumsum(x))[column] + (1j * scale - t) / s * np.append(0, np.cumsum(y))[row]
-        h, k = x[column[cells].min(axis=1)], y[row[cells].min(axis=1)]
-        parts = (np.column_stack([s * k / h, s * h / k, np.full(len(h), t)]) @ kind.part.T)[:, direction]
+        metric = np.linalg.lstsq(kind.part * around[:, None], typical, rcond=None)[0]
+        across, along, t = metric
+        if not across * along > t**2:
+            return None
+        scale = float(np.sign(across) * np.sqrt(across * along - t**2))
+        z = at[:, 0] + (1j * scale - t) / along * at[:, 1]
+        parts = np.tile((kind.part @ metric)[direction], (len(cells), 1))
         diagonal = -parts @ (np.eye(cells.shape[1])[one] + np.eye(cells.shape[1])[other])
-        present, added = _present(matrix, cells, edge, parts, diagonal, h * k)
+        present, added = _present(matrix, cells, edge, parts, diagonal)
         cells, parts = cells[present], parts[present]
         used = np.arange(len(at)) < n
         used[cells] = True
@@ -118,84 +118,14 @@ def _around(at: NDArray[np.int64], kind: _Kind) -> tuple[NDArray[np.int64], NDAr
     return np.column_stack(np.divmod(values, width)), order[np.searchsorted(values, wanted, sorter=order)]
 
 
-def _sizes(
-    matrix: OperatorMatrix, grid: Grid, kind: _Kind, inside: NDArray[np.int64]
-) -> tuple[float, float, NDArray[np.float64], NDArray[np.float64]] | None:
-    """s, t, and steps along both axes, one more at either end; None where entries are no products, or leave them open.
-
-    `inside` (m, p): edges of cells all of which have entries.
-    """
-    entries, number = matrix.entries, np.bincount(inside.ravel(), minlength=len(matrix.edges))
-    across = kind.pairs[:, 2] > 1
-    half = np.repeat(entries[inside[:, across]].sum(axis=1) / 2, np.count_nonzero(~across))
-    weight = -entries - np.bincount(inside[:, ~across].ravel(), half, len(entries))
-    whole = number == len(kind.corners) * np.bincount(kind.pairs[:, 2])[grid.step]
-    start = (grid.at - grid.at.min(axis=0))[matrix.edges].min(axis=1)
-    products = []
-    for axis in (0, 1):
-        some = whole & (grid.step == axis)
-        factors = _factors(start[some, axis], start[some, 1 - axis], weight[some], int(np.ptp(grid.at[:, axis])))
-        if factors is None:
-            return None
-        products.append(factors)
-    (x, line_x, sum_y), (y, line_y, sum_x) = products
-    up, down = np.median(sum_y / (y[line_x] + y[line_x + 1])), np.median(sum_x / (x[line_y] + x[line_y + 1]))
-    s = float(2 * np.sign(up) * np.sqrt(up * down)) if up * down > 0 else 0.0
-    diagonals = [np.median(entries[whole & (grid.step == d)]) for d in range(2, len(kind.part))]
-    t = float(np.dot(np.sign(kind.part[2:, 2]), diagonals))
-    if not abs(s) > abs(t):
-        return None
-    sizes = [x, y * np.sqrt(up / down)]
-    for axis in (0, 1):
-        for line, end, step in ((0, 0, 1), (len(sizes[axis]) - 2, -1, -2)):
-            rim = (grid.step == 1 - axis) & (start[:, axis] == line) & (number == 1)
-            along, cell = sizes[1 - axis][1 + start[rim, 1 - axis]], sizes[axis][step]
-            own, turned, skewed = kind.part[1 - axis, [1 - axis, axis, 2]]
-            rest = entries[rim] / s - own * cell / along - turned * along / cell - skewed * t / s
-            gone = np.abs(rest) > ALIKE * np.abs(entries[rim] / s)
-            # What a cell of a width r times the length of the edge adds: own r + turned / r + what is skewed.
-            half = rest[gone] - skewed * t / s
-            root = np.abs(half) + np.sqrt(half**2 - 4 * own * turned)
-            with np.errstate(invalid="ignore"):
-                ratio = np.where(half > 0, 2 * turned / root, root / (-2 * own))
-            if gone.any():
-                sizes[axis][end] = np.median(ratio * along[gone])
-    return (s, t, sizes[0], sizes[1]) if all((own > 0).all() for own in sizes) else None
-
-
-def _factors(
-    i: NDArray[np.int64], j: NDArray[np.int64], value: NDArray[np.float64], n: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]] | None:
-    """Steps a (n + 2,), lines j and b there, with values b[j] / a[i]: up to a factor; None unless of one sign.
-
-    Steps that no value ties to most, and those at both ends, are as the nearest ones.
-    """
-    if not len(value) or not (np.sign(value) * np.sign(value[0]) > 0).all():
-        return None
-    pairs = sp.csr_array((value, (i, n + j)), shape=(n + int(j.max()) + 1,) * 2)
-    order, before = csgraph.breadth_first_order(pairs, np.bincount(i).argmax(), directed=False)
-    later = order[1:]
-    ratios = np.asarray((pairs + pairs.T)[later, before[later]])
-    size = np.full(pairs.shape[0], np.nan)
-    size[order[0]] = 1
-    for node, parent, ratio in zip(later.tolist(), before[later].tolist(), ratios.tolist(), strict=True):
-        size[node] = size[parent] * ratio if node >= n else size[parent] / ratio
-    a, b = size[:n], size[n:]
-    if (np.abs(b[j] / a[i] - value) > CERTIFIED * np.abs(value)).any():
-        return None
-    known, lines = (np.flatnonzero(np.isfinite(part)) for part in (a, b))
-    return np.interp(np.arange(-1, n + 1), known, a[known]), lines, b[lines]
-
-
 def _present(
-    matrix: OperatorMatrix, cells: NDArray[np.int64], edge: NDArray[np.int64], parts: NDArray, diagonal: NDArray,
-    area: NDArray,
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:  # fmt: skip
+    matrix: OperatorMatrix, cells: NDArray[np.int64], edge: NDArray[np.int64], parts: NDArray, diagonal: NDArray
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Which cells there are, and what diagonal entries have besides, (n,): a multiple of a lumped mass matrix.
 
     Cells add `parts`, (m, p), to the entries of `edge`, (m, p), -1 for none, and `diagonal`, (m, k), to those of their
-    corners, and have `area`, (m,), up to a factor. Where an entry is that of one cell only it is the one with more
-    rows. Cells of a single row show in its diagonal entry.
+    corners. Where an entry is that of one cell only it is the one with more rows. Cells of a single row show in its
+    diagonal entry.
     """
     n, own = matrix.n, cells < matrix.n
     rows, tolerance = own.sum(axis=1), CERTIFIED * matrix.row_size
@@ -208,7 +138,7 @@ def _present(
     present[cell[shown & (np.abs(part) > near)]] = True
     missing = np.bincount(cells[~present][own[~present]], minlength=n) > 0
     rest = matrix.diagonal - _sums(cells, diagonal, present, n)
-    mass = np.broadcast_to(area[:, None], cells.shape)
+    mass = np.ones(cells.shape)
     inside = _sums(cells, mass, present, n)
     density = np.median(rest[~missing] / inside[~missing]) if not missing.all() else 0.0
     density *= (np.abs(density * inside) > tolerance)[~missing].any()

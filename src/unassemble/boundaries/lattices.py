@@ -94,7 +94,7 @@ def recover_lattice(
 
 def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
     notes = [
-        "this is the only mesh of parallelograms in rows and columns, or of halves of these; others, bent next to the "
+        "this is the only mesh of parallelograms that are all alike, or of halves of these; others, bent next to the "
         "unknowns that were eliminated, may fit as well"
     ]
     if lattice.added.any():

@@ -28,7 +28,6 @@ from ..tolerances import LAST_DIGITS, ROUNDED, SUMMED
 from ..topology.pieces import planar_pieces
 from .first import SLOWLY
 from .fit import Fit, FitOptions, WholeEntries
-from .patch import moved_along
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -67,7 +66,7 @@ def fit_lengths(
     curvature.
     """
     piece, fading = rim.piece, SLOWLY
-    scale = problem.best_scale(z, rim.whole)
+    scale = float(problem.best_scale(z, rim.whole)[0])
     u = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]]) ** 2
     if not (heron(u[piece.opposite]) > 0).all():
         u = np.ones(len(u))
@@ -85,11 +84,9 @@ def fit_lengths(
                 found = _laid_out(rim, lengths.edges, here.weights, z)
                 if found is None:
                     return None
-                return problem.fit(found[0], here.scale, found[1].whole, 0.0, newton), found[1]
+                return problem.fit(found[0], np.array([here.scale]), found[1].whole, 0.0, newton), found[1]
         except (GeometryError, SolverError):
             return None
-        finally:
-            lengths.release()
         u[lengths.edges], scale, fading, left = here.u, here.scale, SLOWLY[2:], lengths.left
         hot = np.zeros(piece.n_vertices)
         hot[lengths.inside] = np.abs(here.curvature)
@@ -102,7 +99,7 @@ def fit_lengths(
 def _laid_out(
     rim: Rim, edges: NDArray[np.int64], weights: NDArray[np.float64], z: NDArray[np.complex128]
 ) -> tuple[NDArray[np.complex128], Rim] | None:
-    """Positions (n,) of the largest part that edges join, others beside it as in z; and the rim of this part."""
+    """Positions (n,) of the largest part that edges join, others as in z; and the rim of this part."""
     piece = rim.piece
     local = np.full(len(piece.edges), -1)
     local[edges] = np.arange(len(edges))
@@ -115,13 +112,11 @@ def _laid_out(
     flat = polish(part, weights[part.edge_rows], conformal_map(part, weights[part.edge_rows], scale=1.0).z, scale=1.0).z
     here = part.vertices
     similarity = min((fit_similarity(flat, z[here], mirror=mirror) for mirror in (False, True)), key=lambda one: one[1])
-    inside = np.zeros(piece.n_vertices, dtype=bool)
-    inside[here] = True
     found = z.copy()
     found[here] = similarity[0](flat)
     own = np.zeros(len(piece.edges), dtype=bool)
     own[edges[part.edge_rows]] = True
-    return moved_along(piece, z, found, inside), replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
+    return found, replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
 
 
 class _Lengths:
@@ -145,12 +140,6 @@ class _Lengths:
         self.prior = sp.csr_array((share.ravel(), (row, ends.ravel())), shape=(len(ends), len(self.edges)))
         self._convex: Factorisation | None = None
         self.left = most
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        if self._convex is not None:
-            self._convex.release()
-        self._convex = None
 
     def at(self, u: NDArray, scale: float) -> _Metric | None:
         """A metric with its derivatives; None where some triangle has no area."""
@@ -260,5 +249,4 @@ class _Lengths:
         x = np.zeros(len(room))
         for _ in range(6):
             x += solver.solve(right - matrix @ x)
-        solver.release()
         return x[:e], float(x[e])

@@ -7,47 +7,29 @@ others: each vertex has a damping, and a step counts where it lowers the squares
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..topology import Piece
-from .fit import Scale, System, WholeEntries, first_flips
+from .fit import System, WholeEntries, first_flips
 from .shape import ShapePrior
 
 
-@dataclass(frozen=True, eq=False)
-class Patch:
-    """The triangles with a part in entries that moving vertices change, as a piece without boundary loops."""
-
-    piece: Piece
-    vertices: NDArray[np.int64]  # (k,) of the whole piece
-    edges: NDArray[np.int64]  # (e,)
-    triangles: NDArray[np.int64]  # (m,)
-    free: NDArray[np.bool_]  # (k,) vertices that move
-
-    @classmethod
-    def about(cls, piece: Piece, free: NDArray[np.bool_]) -> Patch:
-        """About vertices (n,) bool that move."""
-        touched = np.unique(piece.opposite[free[piece.triangles].any(axis=1)])
-        corners = piece.facing[touched]
-        chosen = np.unique(corners[corners >= 0] // 3)
-        vertices, triangles = np.unique(piece.triangles[chosen], return_inverse=True)
-        edges, opposite = np.unique(piece.opposite[chosen], return_inverse=True)
-        number = np.full(len(piece.triangles) + 1, -1)
-        number[chosen] = np.arange(len(chosen))
-        triangle, corner = np.divmod(piece.facing[edges], 3)  # of -1, the last number
-        facing = np.where(number[triangle] >= 0, 3 * number[triangle] + corner, -1)
-        facing = np.where(facing[:, :1] < 0, facing[:, ::-1], facing)
-        ends = np.searchsorted(vertices, piece.edges[edges])
-        part = Piece(
-            vertices, edges, ends, triangles.reshape(-1, 3), opposite.reshape(-1, 3), facing,
-            np.empty((0, 2), np.int64), np.zeros(1, np.int64),
-        )  # fmt: skip
-        return cls(part, vertices, edges, chosen, free[vertices])
+def _about(piece: Piece, free: NDArray[np.bool_]) -> tuple[Piece, NDArray[np.int64]]:
+    """The triangles (m,) with a part in entries that moving vertices, (n,) bool, change; as a piece without loops."""
+    touched = np.unique(piece.opposite[free[piece.triangles].any(axis=1)])
+    corners = piece.facing[touched]
+    chosen = np.unique(corners[corners >= 0] // 3)
+    vertices, triangles = np.unique(piece.triangles[chosen], return_inverse=True)
+    edges, opposite = np.unique(piece.opposite[chosen], return_inverse=True)
+    number = np.full(len(piece.triangles) + 1, -1)
+    number[chosen] = np.arange(len(chosen))
+    triangle, corner = np.divmod(piece.facing[edges], 3)  # of -1, the last number
+    facing = np.where(number[triangle] >= 0, 3 * number[triangle] + corner, -1)
+    facing = np.where(facing[:, :1] < 0, facing[:, ::-1], facing)
+    ends, loops = np.searchsorted(vertices, piece.edges[edges]), (np.empty((0, 2), np.int64), np.zeros(1, np.int64))
+    return Piece(vertices, edges, ends, triangles.reshape(-1, 3), opposite.reshape(-1, 3), facing, *loops), chosen
 
 
 def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
@@ -87,60 +69,27 @@ def spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArra
 
 
 def fit_near(
-    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_], free: NDArray[np.bool_],
-    schedule: Sequence[tuple[float, int]], rng: np.random.Generator | None = None,
+    problem: WholeEntries, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], free: NDArray[np.bool_],
+    schedule: Sequence[tuple[float, int]],
 ) -> NDArray[np.complex128]:  # fmt: skip
     """Positions of which some, (n,) bool, are improved; the others, and c, stay.
 
-    A schedule has weights of the prior, one after the other, and numbers of steps with each; with a generator the prior
-    has random triangles.
+    A schedule has weights of the prior, one after the other, and numbers of steps with each.
     """
-    patch = Patch.about(problem.piece, free)
-    region = None if problem.region is None else problem.region[patch.triangles]
-    given, guessed = problem.weights[patch.edges], problem.guessed[patch.edges]
-    part = WholeEntries(patch.piece, given, guessed, scale, patch.free, region)
+    piece, triangles = _about(problem.piece, free)
+    here, edges = piece.vertices, piece.edge_rows
+    given, guessed = problem.weights[edges], problem.guessed[edges]
+    part = WholeEntries(piece, given, guessed, scale, free[here], problem.region[triangles])
     moved = z.copy()
-    try:
-        for mu, steps in schedule:
-            moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps, rng)
-    finally:
-        part.release()
+    for mu, steps in schedule:
+        moved[here] = _fitted(part, moved[here], scale, whole[edges], mu, steps)
     return moved
 
 
-def fit_anew(
-    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_], places: NDArray[np.bool_],
-    rng: np.random.Generator,
-) -> NDArray[np.complex128]:  # fmt: skip
-    """Positions about places that do not fit, (n,) bool, from random triangles at the rim; what is no better stays.
-
-    Few entries may have several solutions next to each other and a minimum that is none, each with triangles of its
-    own: which of them a fit comes to is decided by the prior.
-    """
-    piece = problem.piece
-    free = distance(piece, places, 3) <= 3
-    with np.errstate(all="ignore"):  # random triangles may lead far away
-        there = fit_near(problem, z, scale, whole, free, ((0.1, 10), (0.01, 5)), rng)
-        there = fit_near(problem, there, scale, whole, free, ((1e-3, 10), (0.0, 20)))
-    ends = piece.edges[free[piece.edges].all(axis=1)].T
-    graph = sp.coo_array((np.ones(ends.shape[1], np.int8), ends), shape=(len(z), len(z)))
-    label = np.where(free, csgraph.connected_components(graph, directed=False)[1], -1)
-    touched = label[piece.stencil].max(axis=0)
-    asked = whole & (touched >= 0)
-    with np.errstate(all="ignore"):
-        before, after = (
-            np.bincount(touched[asked], problem.misfits(some, scale)[asked] ** 2, len(z)) for some in (z, there)
-        )
-    return np.where(free & (after < before)[label], there, z)
-
-
 def _fitted(
-    part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int,
-    rng: np.random.Generator | None,
-) -> NDArray[np.complex128]:  # fmt: skip
-    piece, scale = part.piece, part.known_scale
-    prior = ShapePrior.of(piece, ~whole).about(part.free)
-    prior = prior if rng is None else prior.unlike(rng)
+    part: WholeEntries, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mu: float, steps: int
+) -> NDArray[np.complex128]:
+    piece, prior = part.piece, ShapePrior.of(part.piece, ~whole).about(part.free)
     whole = whole & part.asked
     fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
     damping = np.full(len(z), 1e-3)

@@ -15,7 +15,6 @@ class ShapePrior:
     """log |ab|^2 less the mean of log |bc|^2 and log |ca|^2, for triangles abc on a side ab without a whole entry."""
 
     corners: NDArray[np.int64]  # (3, m) a, b, c
-    wanted: NDArray[np.float64] | float = 0.0  # (m,) what it should be
 
     @classmethod
     def of(cls, piece: Piece, unknown: NDArray[np.bool_]) -> ShapePrior:
@@ -27,10 +26,6 @@ class ShapePrior:
         """Of triangles with one of these vertices, (n,) bool."""
         return ShapePrior(self.corners[:, vertices[self.corners].any(axis=0)])
 
-    def unlike(self, rng: np.random.Generator) -> ShapePrior:
-        """For triangles that are random, sides differing by factors of about 1.6."""
-        return ShapePrior(self.corners, rng.standard_normal(self.corners.shape[1]))
-
     def _sides(self, z: NDArray) -> NDArray[np.complex128]:
         a, b, c = z[self.corners]
         return np.stack([b - a, c - b, a - c])
@@ -38,7 +33,7 @@ class ShapePrior:
     def residual(self, z: NDArray) -> NDArray[np.float64]:
         """(m,)."""
         ab, bc, ca = np.log(np.abs(self._sides(z)))
-        return np.asarray(2 * ab - bc - ca - self.wanted)
+        return np.asarray(2 * ab - bc - ca)
 
     def gradient(self, z: NDArray) -> NDArray[np.complex128]:
         """(3, m) g with d residual = Re sum_k g_k dz_k over the corners."""

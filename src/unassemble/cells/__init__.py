@@ -3,18 +3,11 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .completion import completed, guessed
-from .doubt import Outcome, in_doubt
-from .undivided import undivided
-from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
-
-__all__ = [
-    "SEARCHED_ROWS",
-    "Alternative",
-    "Outcome",
-    "alternatives",
-    "completed",
-    "guessed",
-    "in_doubt",
-    "undivided",
-]
+from .completion import completed as completed, guessed as guessed
+from .doubt import Outcome as Outcome, in_doubt as in_doubt
+from .undivided import undivided as undivided
+from .unique.alternatives import (
+    SEARCHED_ROWS as SEARCHED_ROWS,
+    Alternative as Alternative,
+    alternatives as alternatives,
+)

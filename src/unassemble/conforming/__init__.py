@@ -4,15 +4,6 @@ The form M = L/2 - T annihilates the coordinates whatever the element is (theory
 from the sets of rows that are coupled to each other.
 """
 
-from .assembly import Entries
-from .parts import parts_of
-from .recover import recover_conforming, shown_cells
-from .roles import Cells
-
-__all__ = [
-    "Cells",
-    "Entries",
-    "parts_of",
-    "recover_conforming",
-    "shown_cells",
-]
+from .assembly import Entries as Entries
+from .parts import parts_of as parts_of
+from .roles import Cells as Cells

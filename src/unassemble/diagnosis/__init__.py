@@ -1,19 +1,7 @@
 """What a scalar matrix is, read off its graph and its sums without solving anything: one answer for everybody."""
 
-from .kinds import PLANAR, Diagnosis
-from .mass import mass_matrix, refuse_masses
-from .scalar import diagnosed, explained, judged
-from .structural import indefinite
-from .sums import further_terms
-
-__all__ = [
-    "PLANAR",
-    "Diagnosis",
-    "diagnosed",
-    "explained",
-    "further_terms",
-    "indefinite",
-    "judged",
-    "mass_matrix",
-    "refuse_masses",
-]
+from .kinds import PLANAR as PLANAR, Diagnosis as Diagnosis
+from .mass import mass_matrix as mass_matrix, refuse_masses as refuse_masses
+from .scalar import diagnosed as diagnosed, explained as explained, judged as judged
+from .structural import indefinite as indefinite
+from .sums import further_terms as further_terms

@@ -45,7 +45,7 @@ def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool
     Cells re-assemble wherever they lie, and those of the plane in any size. Two nodes that they share fix both; and
     nodes that are `firm`, (n,), are as good as the nodes of one cell.
     """
-    held, pieces = np.zeros(len(piece), dtype=bool), np.arange(piece.max() + 1)
+    pieces = np.arange(piece.max() + 1)
     groups = [*found.blocks.values(), *(np.flatnonzero(firm & (piece == k))[None] for k in pieces)]
     count = np.repeat([group.shape[1] for group in groups], [len(group) for group in groups])
     first = np.concatenate([*(piece[cells[:, 0]] for cells in found.blocks.values()), pieces])
@@ -53,13 +53,9 @@ def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool
     member = sp.csr_array((np.ones(len(nodes), np.int32), nodes, start), shape=(len(count), len(piece)))
     shared = member @ member.T
     label = sp.csgraph.connected_components(sp.csr_array(shared >= 2), directed=False)[1]
-    size = np.bincount(label, count)[label]
-    for k in pieces:
-        here = np.flatnonzero((first == k) & (count > 0))
-        if len(here):
-            best = label[here[np.argmax(size[here])]]
-            held |= np.asarray(member[label == best].sum(axis=0) > 0)
-    return held
+    order = np.lexsort((np.bincount(label, count)[label], first))
+    best = label[order[np.append(np.diff(first[order]) > 0, True)]]  # the largest of each piece
+    return np.asarray(member[np.isin(label, best)].sum(axis=0) > 0)
 
 
 def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -4,40 +4,20 @@ Nothing here knows what a matrix belongs to: scalar and vector-valued operators 
 element matrices and candidates.
 """
 
-from .candidates import candidates
-from .cliques import Graph
-from .kinds import KINDS
-from .ordering import ordered, ordered_boxes
+from .candidates import candidates as candidates
+from .cliques import Graph as Graph
+from .kinds import KINDS as KINDS
+from .ordering import ordered as ordered, ordered_boxes as ordered_boxes
 from .reference import (
-    assembled,
-    elasticity,
-    exact_rule,
-    mass,
-    planar_rules,
-    reference_nodes,
-    rules,
-    shape_functions,
-    shape_gradients,
-    volumes,
+    assembled as assembled,
+    elasticity as elasticity,
+    exact_rule as exact_rule,
+    mass as mass,
+    planar_rules as planar_rules,
+    reference_nodes as reference_nodes,
+    rules as rules,
+    shape_functions as shape_functions,
+    shape_gradients as shape_gradients,
+    volumes as volumes,
 )
-from .surface import outer_facets, outer_nodes
-
-__all__ = [
-    "KINDS",
-    "Graph",
-    "assembled",
-    "candidates",
-    "elasticity",
-    "exact_rule",
-    "mass",
-    "ordered",
-    "ordered_boxes",
-    "outer_facets",
-    "outer_nodes",
-    "planar_rules",
-    "reference_nodes",
-    "rules",
-    "shape_functions",
-    "shape_gradients",
-    "volumes",
-]
+from .surface import outer_facets as outer_facets, outer_nodes as outer_nodes

@@ -1,20 +1,12 @@
 """Sparse linear algebra behind one small interface."""
 
-from .definite import nearly_singular, solved, svd
-from .factorisation import Factorisation, backend, blas_threads, factorisation, threads
-from .responses import SamplingOptions
-from .upper import UpperTriangle, upper_from_edges
-
-__all__ = [
-    "Factorisation",
-    "SamplingOptions",
-    "UpperTriangle",
-    "backend",
-    "blas_threads",
-    "factorisation",
-    "nearly_singular",
-    "solved",
-    "svd",
-    "threads",
-    "upper_from_edges",
-]
+from .definite import nearly_singular as nearly_singular, solved as solved, svd as svd
+from .factorisation import (
+    Factorisation as Factorisation,
+    backend as backend,
+    blas_threads as blas_threads,
+    factorisation as factorisation,
+    threads as threads,
+)
+from .responses import SamplingOptions as SamplingOptions
+from .upper import UpperTriangle as UpperTriangle, upper_from_edges as upper_from_edges

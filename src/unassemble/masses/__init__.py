@@ -4,8 +4,9 @@
 that these do not tell; `held` judges what was found by the whole matrix.
 """
 
-from .beside import weighed
-from .recover import recover_elements_with_terms, recover_with_terms
-from .settled import less_mass
-
-__all__ = ["less_mass", "recover_elements_with_terms", "recover_with_terms", "weighed"]
+from .beside import weighed as weighed
+from .recover import (
+    recover_elements_with_terms as recover_elements_with_terms,
+    recover_with_terms as recover_with_terms,
+)
+from .settled import less_mass as less_mass

@@ -61,11 +61,6 @@ class Normal:
         self._factor.factorise(matrix)
         return self._factor
 
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        if self._factor is not None:
-            self._factor.release()
-
 
 def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) -> Metric:
     """Edge lengths of an edge-connected surface with `weights` (e,), c w for an unknown c > 0.
@@ -85,8 +80,6 @@ def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) ->
                 u = _newton(unit, opposite, normal, u, _STEPS - count)
     except SolverError as error:
         raise GeometryError(_NONE) from error
-    finally:
-        normal.release()
     _, cotangents = areas_cotangents(u[opposite])
     return Metric(u / u.mean(), float((weights @ u) / (summed(opposite, cotangents / 2, len(u)) @ u)))
 

@@ -168,5 +168,4 @@ def length_deviations(
         change = factor.solve(told * squared[:, None]) * (length / 2)[:, None]
         change -= length[:, None] * change.mean(axis=0) / length.mean()
         total += (change**2).sum(axis=1)
-    normal.release()
     return np.sqrt(total)

@@ -130,35 +130,27 @@ def _certain(group: NDArray[np.int64], rows_c: NDArray[np.int64], rows_b: NDArra
     while True:
         piece = np.concatenate([np.searchsorted(r, rows_c), np.searchsorted(s, rows_b)])
         label = group[np.concatenate([rows_c, rows_b])] * (len(r) + 1) + piece
-        label_c, label_b = np.split(np.unique(label, return_inverse=True)[1], [len(rows_c)])
-        more = _uncrossed(*_in_turn(label_c, label_b))
+        more = _in_turn(*np.split(np.unique(label, return_inverse=True)[1], [len(rows_c)]))
         if len(more[0]) <= len(r):
             return r, s
         r, s = rows_c[more[0]], rows_b[more[1]]
 
 
-def _in_turn(
-    label_c: NDArray[np.int64], label_b: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Places of rows of the same label, the first with the first, where there are as many; and their label."""
+def _in_turn(label_c: NDArray[np.int64], label_b: NDArray[np.int64]) -> Pairs:
+    """Places of rows of the same label, the first with the first, where there are as many and their pairs do not cross.
+
+    Nodes of a group may lack one direction each, and as many of them one as the other. Then the first row of one
+    direction is paired with the first of another node, and crosses most others.
+    """
     many = max(label_c.max(initial=0), label_b.max(initial=0)) + 1
     equal = np.bincount(label_c, minlength=many) == np.bincount(label_b, minlength=many)
     r, s = (np.flatnonzero(equal[label]) for label in (label_c, label_b))
     r, s = r[np.argsort(label_c[r], kind="stable")], s[np.argsort(label_b[s], kind="stable")]
     order = np.argsort(r)
-    return r[order], s[order], label_c[r[order]]
-
-
-def _uncrossed(r: NDArray[np.int64], s: NDArray[np.int64], label: NDArray[np.int64]) -> Pairs:
-    """Pairs of labels none of whose pairs crosses those of most others.
-
-    Nodes of a group may lack one direction each, and as many of them one as the other. Then the first row of one
-    direction is paired with the first of another node.
-    """
-    kept = np.zeros(len(r), dtype=bool)
-    kept[_longest_increasing(s)] = True
-    wrong = np.bincount(label, ~kept, minlength=label.max(initial=0) + 1) > 0
-    kept &= ~wrong[label]
+    r, s = r[order], s[order]
+    crossing = np.ones(len(r), dtype=bool)
+    crossing[_longest_increasing(s)] = False
+    kept = np.bincount(label_c[r], crossing, minlength=many)[label_c[r]] == 0
     return r[kept], s[kept]
 
 
@@ -166,15 +158,12 @@ def _longest_increasing(s: NDArray[np.int64]) -> NDArray[np.int64]:
     """Places of a longest subsequence that strictly increases (patience sorting)."""
     ends: list[int] = []
     at: list[int] = []
-    before = np.full(len(s), -1)
-    for place, value in enumerate(s.tolist()):
+    before: list[int] = []
+    for value in s.tolist():
         k = bisect_left(ends, value)
-        ends[k : k + 1] = [value]
-        at[k : k + 1] = [place]
-        before[place] = at[k - 1] if k else -1
-    chain = []
-    place = at[-1] if at else -1
-    while place >= 0:
-        chain.append(place)
-        place = int(before[place])
+        ends[k : k + 1], at[k : k + 1] = [value], [len(before)]
+        before.append(at[k - 1] if k else -1)
+    chain = at[-1:]
+    while chain and before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
     return np.array(chain[::-1], dtype=np.int64)

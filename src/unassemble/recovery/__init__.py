@@ -3,18 +3,6 @@
 Files, reports, pictures and near-null spaces are made of a result from above, in :mod:`unassemble.outputs`.
 """
 
-from .base import ELEMENT_NAMES, Recovery
-from .mechanical import Body, Evidence, Mechanical, Structure
-from .scalar import ConformingMesh, PlanarMesh, Surface
-
-__all__ = [
-    "ELEMENT_NAMES",
-    "Body",
-    "ConformingMesh",
-    "Evidence",
-    "Mechanical",
-    "PlanarMesh",
-    "Recovery",
-    "Structure",
-    "Surface",
-]
+from .base import ELEMENT_NAMES as ELEMENT_NAMES, Recovery as Recovery
+from .mechanical import Body as Body, Evidence as Evidence, Mechanical as Mechanical, Structure as Structure
+from .scalar import ConformingMesh as ConformingMesh, PlanarMesh as PlanarMesh, Surface as Surface

@@ -5,7 +5,5 @@ and factors. Which triangles belong to which region, entries show nearly by them
 fit decide the last ones.
 """
 
-from .guess import uneven
-from .recover import exchange_budget, recover_regions
-
-__all__ = ["exchange_budget", "recover_regions", "uneven"]
+from .guess import uneven as uneven
+from .recover import exchange_budget as exchange_budget, recover_regions as recover_regions

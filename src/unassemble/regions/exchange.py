@@ -130,7 +130,6 @@ class _Shares:
             factor = problem.analysed(matrix)
             factor.factorise(matrix)
         except SolverError:
-            problem.release()
             return none
         pulled = sp.csr_array((system.jacobian_transposed @ added.T).T)
         response = factor.solve(system.slope)

@@ -10,23 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..boundaries import recover_partial
-from ..boundaries.first import guessed, relaxed, tutte
+from ..boundaries.first import conformal, guessed, tutte, upright
 from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
 from ..boundaries.inside import InsideMesh, PieceEntries, finished, fit_inside, shrunk
 from ..boundaries.partial import distinct
-from ..boundaries.patch import distance
 from ..boundaries.rim import Rim
 from ..budget import SAMPLE, Budget
 from ..clock import Clock
-from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.conformal import conformal_map
-from ..planar.cotangent import areas, corner_sides, edge_weights
 from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..scalar.placement import Placement
-from ..topology import Piece
 from .exchange import exchanges
 from .guess import guessed_regions
 
@@ -58,7 +53,7 @@ def recover_regions(
 
 def _with_regions(budget: Budget, given: Sequence[PieceEntries], _: float | None) -> list[InsideMesh | None]:
     """Meshes of pieces, of which some have regions; else none."""
-    guesses = [guessed_regions(own.piece, own.halved, own.whole | own.shared) for own in given]
+    guesses = [guessed_regions(own.piece, own.weights, own.whole | own.shared) for own in given]
     if all(len(scale) == 1 or _uniform(own) for own, (_, scale) in zip(given, guesses, strict=True)):
         return [None] * len(given)
     whole = all(own.whole.all() for own in given)  # then nothing explains why pieces should have no mesh
@@ -82,24 +77,19 @@ def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray, budg
     What rims do not fit where no exchange is left is taken off.
     """
     unit = float(np.median(scale))
-    weights = given.halved / unit
+    weights = given.weights / unit
     likely = given.shared & (weights > 0)
     problem = WholeEntries(given.piece, weights, given.whole | likely, region=region)
     rim, scale = Rim.of(given.piece, given.whole), scale / unit
-    try:
-        if not rim.whole.any():
-            return None
-        fit = _exchanged(problem, rim, scale, budget)
-        if fit.misfit > EXACT:
-            fit, rim = shrunk(problem, rim, fit, 3, 0.25)
-        if not fit.misfit <= EXACT:
-            return None
-        used, place = np.unique(problem.region, return_inverse=True)
-        scale, same = distinct(fit.scale[used])
-        problem.region = same[place.ravel()]
-        return finished(problem, replace(fit, scale=scale), rim, unit)
-    finally:
-        problem.release()
+    if not rim.whole.any():
+        return None
+    fit = _exchanged(problem, rim, scale, budget)
+    if fit.misfit > EXACT:
+        fit, rim = shrunk(problem, rim, fit, 0.25)
+    used, place = np.unique(problem.region, return_inverse=True)
+    scale, same = distinct(fit.scale[used])
+    problem.region = same[place.ravel()]
+    return finished(problem, replace(fit, scale=scale), rim, unit)
 
 
 def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) -> Fit:
@@ -110,13 +100,11 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) 
     """
     piece, weights, whole = problem.piece, problem.weights, rim.whole
 
-    def fit(region: NDArray, z: NDArray, scale: NDArray) -> Fit:
-        problem.region = region
-        return problem.fit(z, scale, whole, 0.0, _NEXT)
-
     def anew(region: NDArray, scale: NDArray) -> Fit:
         problem.region = region
-        z, scale = started(piece, weights, rim.given, region, scale)
+        z = conformal(piece, guessed(piece, weights / problem.unit(scale), rim.given, 1.0), None)
+        if not upright(piece, z):
+            z = tutte(piece, int(np.argmax(np.diff(piece.loop_offsets))))
         if not whole.all():
             first = problem.fit(z, scale, whole, 0.1, FitOptions(steps=40, damping=1e-2))
             first = problem.faded(first.z, first.scale, whole, (0.01, 1e-3))
@@ -139,7 +127,8 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) 
         elif other.tobytes() not in seen:
             if not budget.take(piece.n_vertices + 50):
                 break
-            found = fit(other, here.z, here.scale)
+            problem.region = other
+            found = problem.fit(here.z, here.scale, whole, 0.0, _NEXT)
             if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
                 again = anew(other, here.scale)
                 found = again if again.misfit < found.misfit else found
@@ -151,75 +140,3 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) 
             seen.add(other.tobytes())
     problem.region = region
     return best
-
-
-def started(
-    piece: Piece, weights: NDArray, whole: NDArray[np.bool_], region: NDArray[np.int64], scale: NDArray
-) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Positions (n,) in which no triangle is turned over, and factors (k,), from what these are about.
-
-    `weights` (e,) are -A_ij, or about that where they are not `whole`, (e,) bool; `region` (m,) those of triangles.
-    """
-    one, other = region[piece.facing // 3].T
-    alike = whole & ((one == other) | ~piece.inner)
-    best, fewest, factors = None, len(piece.triangles) / 4, scale
-    for _ in range(5):  # each with the factors that fit the one before
-        unit = np.where(piece.inner, (factors[one] + factors[other]) / 2, factors[one])
-        try:
-            found = conformal_map(
-                piece, guessed(piece, weights / unit, whole, 1.0), scale=None, sharp=False,
-                most=2,
-            )  # fmt: skip
-        except (GeometryError, SolverError):
-            break
-        area = areas(piece, found.z)
-        z = (found.z if area.sum() > 0 else np.conj(found.z)) / np.sqrt(np.abs(area).mean())
-        upright = areas(piece, z) > 0
-        drawn = alike & upright[piece.facing // 3].all(axis=1)
-        new = _factors(edge_weights(piece, z), weights, np.where(drawn, one, -1), factors)
-        change = np.abs(new / factors - 1).max()
-        if (~upright).sum() < fewest:
-            best, fewest, scale = z, (~upright).sum(), new
-        factors = new
-        if change < 1e-3:
-            break
-    z = None if best is None else _unfolded(piece, best)
-    return (tutte(piece, int(np.argmax(np.diff(piece.loop_offsets)))) if z is None else z), scale
-
-
-def _factors(drawn: NDArray, weights: NDArray, region: NDArray, scale: NDArray) -> NDArray[np.float64]:
-    """Factors (k,) of the weights of each region that make up for most of the entries: least absolute misfits."""
-    result = scale.copy()
-    for k in range(len(scale)):
-        own = (region == k) & np.isfinite(drawn)
-        w, a, c = drawn[own], weights[own], scale[k]
-        for _ in range(10 * (own.sum() > 2)):
-            misfit = np.abs(a - c * w)
-            trust = 1 / np.maximum(misfit, 0.1 * np.median(misfit) + 1e-12 * abs(c))
-            c = (trust * w) @ a / ((trust * w) @ w)
-        result[k] = c if c / scale[k] > 0 else scale[k]
-    return result
-
-
-def _unfolded(piece: Piece, z: NDArray) -> NDArray[np.complex128] | None:
-    """The same, vertices about triangles that are turned over being means of their neighbours; None if that fails."""
-    for reach in range(1, 7):  # edges
-        near = _folded(piece, z)
-        if not near.any():
-            return z
-        free = distance(piece, near, reach) <= reach
-        if free.all():
-            break
-        z = relaxed(piece.edges, z, free)
-    return None if _folded(piece, z).any() else z
-
-
-def _folded(piece: Piece, z: NDArray) -> NDArray[np.bool_]:
-    """(n,) vertices of triangles that are turned over, and those inside around which triangles go more than once."""
-    after, before = corner_sides(piece.triangles, z)
-    angle = np.angle(before * np.conj(after))
-    around = np.bincount(piece.triangles.ravel(), angle.ravel(), piece.n_vertices)
-    folded = np.abs(around - 2 * np.pi) > 1
-    folded[piece.boundary] = False
-    folded[piece.triangles[areas(piece, z) <= 0]] = True
-    return folded

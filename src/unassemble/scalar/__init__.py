@@ -1,9 +1,4 @@
 """Scalar matrices: everything that ``recover`` does with one, from its topology to the verdict."""
 
-from .joined import joined
-from .recover import recover_scalar
-
-__all__ = [
-    "joined",
-    "recover_scalar",
-]
+from .joined import joined as joined
+from .recover import recover_scalar as recover_scalar

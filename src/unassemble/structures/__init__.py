@@ -1,19 +1,10 @@
 """Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
 
-from .beams import find_beam
-from .frames import serve_structure
-from .layouts import Layout
-from .placed import pieces
-from .recognise import StructuralNumbering, find_structure, given_structure
-from .trusses import truss_numbering
-
-__all__ = [
-    "Layout",
-    "StructuralNumbering",
-    "find_beam",
-    "find_structure",
-    "given_structure",
-    "pieces",
-    "serve_structure",
-    "truss_numbering",
-]
+from .frames import serve_structure as serve_structure
+from .placed import pieces as pieces
+from .recognise import (
+    StructuralNumbering as StructuralNumbering,
+    find_structure as find_structure,
+    given_structure as given_structure,
+)
+from .trusses import truss_numbering as truss_numbering

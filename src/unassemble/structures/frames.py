@@ -54,7 +54,9 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     straight = found.points
     force, used = forces(whole, numbering, nodes, straight, valid)
     ends, misfit = members_misfits(members, layout, straight)
-    used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
+    pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
+    other = pairs[~np.isin(pairs @ [nodes.n, 1], ends @ [nodes.n, 1])]  # whose blocks are no members'
+    used = (used | np.isin(node, ends) & ~np.isin(node, other)) & ~np.isin(node, found.spoiled)
     error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
     blocks = f", {count_of(len(ends), 'block is that', 'blocks are those')} of straight members" if len(ends) else ""
     left = f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
@@ -92,5 +94,5 @@ def _placed(
     spread = rounding.spread if rounding else 0.0
     nodes = nodes_of(matrix, numbering.layout, numbering.node_of_row, numbering.direction_of_row)
     with blas_threads(1):
-        members = straight_members(nodes, max(CERTIFIED, spread) / 2, ends)  # the certificate has other formulas
+        members = straight_members(nodes, (spread or CERTIFIED) / 2, ends)  # the certificate has other formulas
         return nodes, members, *turning_positions(nodes, members, max(CERTIFIED, spread))

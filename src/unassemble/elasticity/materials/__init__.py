@@ -1,7 +1,3 @@
 """The material of elements: which candidates for cells, with which Lame coefficients, add up to the matrix."""
 
-from .cells import recognise_cells
-
-__all__ = [
-    "recognise_cells",
-]
+from .cells import recognise_cells as recognise_cells

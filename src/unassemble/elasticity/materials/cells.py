@@ -35,14 +35,9 @@ class Cells:
     shown: NDArray[np.bool_] | None = None  # (n, d) unknowns whose row has an entry that re-assembles and is not zero
 
     @property
-    def recognised(self) -> bool:
-        """Whether there are cells."""
-        return bool(self.blocks)
-
-    @property
     def certified(self) -> bool:
         """Whether the cells re-assemble to the given matrix."""
-        return self.recognised and bool(np.isfinite(self.backward_error))
+        return bool(self.blocks) and bool(np.isfinite(self.backward_error))
 
     def among(self, nodes: NDArray[np.bool_]) -> Cells:
         """The cells all of whose nodes are among some, (n,) bool."""
@@ -88,7 +83,7 @@ def recognise_cells(
         other = _recognised(points, graph, entries, ratio)
         if other.certified:
             return other
-        found = found if found.recognised else other
+        found = found if found.blocks else other
     return found
 
 
@@ -110,7 +105,7 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
         )
         if found is not None:
             best, most = replace(found, shown=told.shown()), len(told.key)
-        elif not best.recognised and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
+        elif not best.blocks and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
             # without certificate; that cliques lie side by side is no evidence of linear simplices
             best = Cells({one.kind.name: one.cells for one in seen})
         if most == len(entries.key):
