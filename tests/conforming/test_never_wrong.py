@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad, MeshTri
+from skfem import Basis, BilinearForm, ElementQuad1, ElementQuadS2, ElementVector, MeshQuad, MeshQuad2, MeshTri
 from skfem.helpers import ddot, sym_grad, trace
 
 from conforming.assembled import assembled, cell_sets, laplace, largest_error, quadrilaterals
@@ -132,3 +132,19 @@ def test_elasticity_is_no_scalar_matrix():
     matrix = elastic.assemble(basis).tocsr()
     assert recover(matrix).operator == "elasticity"
     assert status(matrix, operator="laplacian") != "certified"
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_few_curved_cells_integrated_by_a_short_rule_leave_nodes_free(seed):
+    """Two points of Gauss each way give eight independent numbers for a cell of eight nodes, and 28 entries."""
+    rng = np.random.default_rng(seed)
+    flat = MeshQuad.init_tensor(np.linspace(0, 1, 3), np.linspace(0, 1, 2 + seed % 2))
+    flat = MeshQuad(flat.p + 0.1 * rng.uniform(-1, 1, flat.p.shape), flat.t)
+    curved = MeshQuad2.from_mesh(flat)
+    points, sides = curved.doflocs.copy(), slice(flat.nvertices, flat.nvertices + flat.nfacets)
+    points[:, sides] += 0.05 * rng.uniform(-1, 1, points[:, sides].shape)
+    cells = curved.dofs.element_dofs
+    points[:, cells[8]] = -0.25 * points[:, cells[:4]].sum(axis=1) + 0.5 * points[:, cells[4:8]].sum(axis=1)
+    basis = Basis(MeshQuad2(points, curved.t), ElementQuadS2(), intorder=3)
+    matrix, order = laplace.assemble(basis), rng.permutation(basis.N)
+    assert status(sp.csr_array(matrix)[order][:, order]) != "certified"

@@ -21,12 +21,13 @@ from ..planar.conformal import conformal_map
 from ..planar.piece import PieceMesh, refined
 from ..planar.polish import count_flipped
 from ..scalar.solving import Task
-from ..tolerances import CERTIFIED, ROUNDED
+from ..tolerances import ALIKE, CERTIFIED, ROUNDED
 from ..topology.keys import distinct
 from .assembly import Entries
 from .parts import Part
 from .sets import pairs_of
 
+_SMALL = 200  # nodes of a part whose equations are counted by their rank
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
 
 
@@ -45,10 +46,21 @@ class Fitted(PieceMesh):
         """(n,) positions of all nodes."""
         return self.entries.nodes(self.z)
 
-    @property
+    @cached_property
     def freedom(self) -> int:
-        """Entries less unknowns, c among these; that others vanish was supposed."""
-        return int(np.count_nonzero(self.weights)) - (2 * self.entries.n - 3)
+        """Entries less unknowns, c among these; that others vanish was supposed. -1 where unknowns stay free.
+
+        The entries of a curved cell that a short rule integrates depend on each other, which shows in small meshes.
+        """
+        n, stored = self.entries.n, self.weights != 0
+        if not self.straight and n <= _SMALL:
+            with np.errstate(all="ignore"):
+                columns = self.entries.jacobian(self.z, np.ones(len(stored))).matrix.toarray()
+                slopes = np.column_stack([columns, self.entries.weights(self.z)])[stored]
+            size = np.linalg.svd(slopes, compute_uv=False) if np.isfinite(slopes).all() else np.zeros(1)
+            if np.count_nonzero(size > ALIKE * size[0]) < 2 * n - 3:
+                return -1
+        return int(np.count_nonzero(stored)) - (2 * n - 3)
 
     @cached_property
     def misfit(self) -> NDArray[np.float64]:

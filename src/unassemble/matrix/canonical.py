@@ -104,7 +104,7 @@ def inconsistency(A: Any) -> str | None:
             sp.coo_array((A.data, A.coords), shape=A.shape)
         elif A.format in ("csr", "csc", "bsr"):
             type(A)((A.data, A.indices, A.indptr), shape=A.shape).check_format(full_check=True)
-    except ValueError as error:
+    except (ValueError, TypeError, AttributeError) as error:  # of arrays of another kind, or none
         return str(error)
     return None
 

@@ -38,6 +38,8 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     """What leaves a mesh in doubt although it fits."""
     topology, error, allowed = f.solved.topology, f.certificate.backward_error, PLACED
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
+    if topology.failures:
+        yield f"{f.fits}, but not in all of it: {topology.failures[0]}", _CHECK_MODEL
     if apart:
         yield f"the matrix is given back to {error:.1e} (relative), but {apart}", ""
     if noise := f.near.by_noise:
@@ -47,7 +49,7 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     if not doubt <= allowed:
         yield f"{f.fits}, but points are known to about {doubt:.0e} of the size only", ""
         yield from ((note, "") for note in f.trouble)
-    if len(topology.bare_edges) and not noise:
+    if len(topology.bare_edges) and not (noise and _linear(f)):
         i, j = topology.edges[topology.bare_edges[0]]
         advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
         yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice

@@ -69,7 +69,9 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
         with request.clock("members"):
             fields = members_and_cells(nodes, found.points, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
-    if sized and not valid[:, moves:].any():
+    if layout.dim == 1:
+        notes.append("a beam by itself lies along x, in a direction that is free")
+    elif sized and not valid[:, moves:].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
                      "spoil them")  # fmt: skip
     untold = np.unique(node[numbering.direction_of_row < 0])
