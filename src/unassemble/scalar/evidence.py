@@ -40,8 +40,7 @@ def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> Evidence
         noise = float(norm(certificate.differences, check_finite=False) / np.sqrt(freedom))
     suspects = _standing_out(solved) if search else NONE
     term = None
-    linear = solved.topology.method != "cliques"
-    if noise and linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
+    if noise and solved.linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
         term = _term(solved, noise)
     return Evidence(None if term else noise, suspects, term)
 

@@ -49,7 +49,7 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     if not doubt <= allowed:
         yield f"{f.fits}, but points are known to about {doubt:.0e} of the size only", ""
         yield from ((note, "") for note in f.trouble)
-    if len(topology.bare_edges) and not (noise and _linear(f)):
+    if len(topology.bare_edges) and not (noise and f.solved.linear):
         i, j = topology.edges[topology.bare_edges[0]]
         advice = "forget stored zeros by `drop_zeros`, if they are no part of the structure"
         yield f"{f.fits}, but the stored zero of rows {i} and {j} belongs to no cell", advice
@@ -64,14 +64,10 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         )
 
 
-def _linear(f: Findings) -> bool:
-    return f.solved.topology.method != "cliques"
-
-
 def _without_spare(f: Findings) -> NDArray[np.int64]:
     """A row of each piece that has no equations to spare."""
     solved, known = f.solved, not f.solved.task.free_scale
-    if _linear(f):
+    if solved.linear:
         return without_spare_equations(solved.stored.edges, f.mesh.points, f.mesh.divided()[0], known_scale=known)
     return np.array([piece.vertices.min() for piece in solved.topology.pieces])[solved.spare + known <= 0]
 
@@ -103,7 +99,7 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         return
     if len(flipped := certificate.flipped):
         some = count_of(len(flipped), "cell is", "cells are")
-        cells = [f.mesh.divided()[0]] if _linear(f) else f.mesh.cells.values()
+        cells = [f.mesh.divided()[0]] if f.solved.linear else f.mesh.cells.values()
         rows = words_of(np.sort(next(islice(chain(*cells), int(flipped[0]), None))))
         yield f"{some} flat, not convex or turned over, the first that of rows {rows}", model
     elif f.evidence.term and (noise or f.solved.task.free_scale):
@@ -136,9 +132,8 @@ def _lacking(f: Findings, term: Term) -> Iterator[tuple[str, str]]:
     """That a term explains a misfit which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     which, advice = "most entries are off in one direction", _CHECK_MODEL
-    if (
-        term.name == COEFFICIENT or f.solved.stored.adds_up.all()
-    ):  # with a mass matrix, or one number added, they do not
+    # With a mass matrix, or one number added, rows do not add up to zero.
+    if term.name == COEFFICIENT or f.solved.stored.adds_up.all():
         which = "a coefficient that varies in space leaves such, and a constant one is assumed"
         advice = "assemble the matrix with a constant coefficient"
     elif term.name == MASS:

@@ -58,6 +58,11 @@ class Solved:
     noise: Noise | None  # without that of rounding, if the misfit is far beyond it
 
     @property
+    def linear(self) -> bool:
+        """Whether the cells are linear triangles; those of other elements are sets of rows."""
+        return self.topology.method != "cliques"
+
+    @property
     def fits(self) -> Iterator[tuple[NDArray, Model, PieceMesh]]:
         """Of each piece its weights, -A_ij, as given, and as functions of positions, and the mesh."""
         weights = [-self.matrix.entries[piece.edge_rows] for piece in self.topology.pieces]
