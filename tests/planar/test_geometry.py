@@ -5,7 +5,7 @@ import pytest
 
 from meshes import edge_list, largest_error, random_mesh, specimen
 from unassemble import GeometryError, SolverError
-from unassemble.certify import certify
+from unassemble.certificate import certify
 from unassemble.linalg import SamplingOptions
 from unassemble.planar import (
     PolishOptions,

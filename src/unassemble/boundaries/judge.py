@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..certify import Certificate
+from ..certificate import Certificate
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
 from ..tolerances import CERTIFIED, ROUNDED

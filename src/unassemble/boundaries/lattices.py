@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
-from ..certify import Terms, certify
+from ..certificate import Terms, certify
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import certify
+from ..certificate import certify
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions

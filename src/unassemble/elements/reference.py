@@ -78,7 +78,7 @@ def rules(kind: Kind) -> Iterator[Rule]:
 
 
 def planar_rules(kind: Kind) -> dict[str, Rule]:
-    """Rules for the plane by the names that :mod:`unassemble.certify_elements` knows, likely ones first.
+    """Rules for the plane by the names that :mod:`unassemble.certificate` knows, likely ones first.
 
     Reduced integration comes last; with a single point quadrilaterals of four nodes have fields of no energy beside the
     constants (hourglass modes), and the matrix does not determine them.

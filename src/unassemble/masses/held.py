@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Terms
+from ..certificate import Terms
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..scalar.held import held

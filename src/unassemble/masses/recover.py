@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..certify import Terms
+from ..certificate import Terms
 from ..clock import Clock
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells

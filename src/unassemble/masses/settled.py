@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Terms
+from ..certificate import Terms
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
 from ..errors import RecoveryError

@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify_metric import certify_metric
+from ..certificate import certify_metric
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError, TopologyError
 from ..matrix import OperatorMatrix

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ..certify import chi_square_verdict
-from ..certify_metric import MetricCertificate
+from ..certificate import MetricCertificate, chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions

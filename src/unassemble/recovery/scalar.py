@@ -28,7 +28,7 @@ class PlanarMesh(Recovery):
     #: (n, 2) one standard deviation of each coordinate, on request.
     standard_deviations: NDArray[np.float64] | None = None
     #: With noise, or entries that were rounded, ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
-    #: ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
+    #: ``largest``, ``largest_p_value``; see :func:`unassemble.certificate.chi_square_verdict`.
     chi_square: Mapping[str, float] | None = None
     #: Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
     estimated_noise: float | None = None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import norm  # whose squares do not overflow
 
-from ..certify import Certificate
+from ..certificate import Certificate
 from ..planar.terms import Term, lacking_term
 from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, SUMMED
 from .solving import Solved

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Certificate, Terms, certify, chi_square_verdict
+from ..certificate import Certificate, Terms, certify, chi_square_verdict
 from ..matrix import OperatorMatrix
 from ..recovery import ConformingMesh, PlanarMesh
 from ..tolerances import CERTIFIED, CHANCE, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
@@ -52,7 +52,7 @@ class Held:
 
     @cached_property
     def figures(self) -> dict[str, float]:
-        """See :func:`unassemble.certify.chi_square_verdict`; empty without noise."""
+        """See :func:`unassemble.certificate.chi_square_verdict`; empty without noise."""
         if self.solved.noise is None:
             return {}
         misfit = self.certificate.differences / np.asarray(self.errors)

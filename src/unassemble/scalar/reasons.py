@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..certify import Certificate
-from ..certify_spare import without_spare_equations
+from ..certificate import Certificate, without_spare_equations
 from ..planar.terms import COEFFICIENT, MASS, Term
 from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of

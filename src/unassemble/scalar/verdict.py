@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..certify import Certificate
+from ..certificate import Certificate
 from ..recovery import PlanarMesh
 from ..words import Reason
 from .evidence import Evidence

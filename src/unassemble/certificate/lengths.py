@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .certify import Certificate, compared, relative
-from .tolerances import CERTIFIED
+from ..tolerances import CERTIFIED
+from .comparison import Certificate, compared, relative
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .tolerances import SINGULAR
+from ..tolerances import SINGULAR
 
 _DENSE = 400  # triangles of a piece whose equations are counted by their rank
 

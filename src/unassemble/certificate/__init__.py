@@ -1,0 +1,10 @@
+"""What a result is worth: the operator re-assembled on the mesh as it is written, held against the matrix.
+
+Nothing here knows how a mesh was found: the room imports no solver and no recovery.
+"""
+
+from .comparison import Certificate as Certificate, Terms as Terms, compared as compared
+from .lengths import MetricCertificate as MetricCertificate, certify_metric as certify_metric
+from .noise import chi_square_verdict as chi_square_verdict
+from .planar import certify as certify
+from .spare import without_spare_equations as without_spare_equations
