@@ -9,8 +9,23 @@ import numpy as np
 
 from meshes import edge_list, random_mesh
 from unassemble import Body, PlanarMesh, Recovery
+from unassemble.certificate import Findings, Verdict, judge
 from unassemble.elements import KINDS, reference_nodes
 from unassemble.topology import surfaces
+from unassemble.words import Reason
+
+
+def verdict(status: str = "certified", reason: str = "it fits", advice: str = "") -> Verdict:
+    """A verdict of each status."""
+    why = Reason(reason, advice=advice)
+    return judge(
+        Findings(
+            (reason,),
+            error=1e-15,
+            objections=(why,) if status == "uncertified" else (),
+            another=why if status == "ambiguous" else None,
+        )
+    )
 
 
 def recovery_of(points: np.ndarray, triangles: np.ndarray) -> PlanarMesh:
@@ -30,9 +45,7 @@ def recovery_of(points: np.ndarray, triangles: np.ndarray) -> PlanarMesh:
         boundary=boundary,
         boundary_offsets=offsets,
         node_status=np.zeros(len(points), dtype=np.int8),
-        status="certified",
-        uniqueness="searched",
-        reason="the operator re-assembled on this mesh gives the matrix back to 1.0e-15",
+        verdict=judge(Findings(("the operator re-assembled on this mesh gives the matrix back to 1.0e-15",), 1e-15)),
         operator="laplacian",
         backward_error=1e-15,
         n_holes=piece.n_loops - 1,
@@ -98,9 +111,7 @@ def solid(kind: str) -> Body:
         boundary=np.empty((0, 2), np.int64),
         boundary_offsets=np.zeros(1, np.int64),
         node_status=np.zeros(8, np.int8),
-        status="certified",
-        uniqueness="searched",
-        reason="the matrix re-assembled on the elements is the given one",
+        verdict=judge(Findings(("the matrix re-assembled on the elements is the given one",), 1e-15)),
         operator="elasticity",
         backward_error=1e-15,
         node_of_row=np.repeat(np.arange(8), d),

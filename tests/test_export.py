@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 import pytest
 
-from handmade import lake, quadratic, solid, with_loose_row
+from handmade import lake, quadratic, solid, verdict, with_loose_row
 from unassemble.elements import KINDS
 from unassemble.errors import FormatError, OutputError
 from unassemble.exchange import STATUS, UNIQUENESS, to_meshio
@@ -356,7 +356,7 @@ def test_the_same_npz_on_every_run(tmp_path):
 
 @pytest.mark.parametrize("status", ["certified", "uncertified"])
 def test_what_a_mesh_is_worth_stands_in_its_file(tmp_path, status):
-    known = lake(status=status, uniqueness="searched" if status == "certified" else None, backward_error=3e-16)
+    known = lake(verdict=verdict(status), backward_error=3e-16)
     known.save(tmp_path / "mesh.npz")
     with np.load(tmp_path / "mesh.npz") as content:
         assert str(content["status"]) == status
@@ -368,7 +368,7 @@ def test_what_a_mesh_is_worth_stands_in_its_file(tmp_path, status):
 @pytest.mark.parametrize("suffix", WORKING)
 def test_every_format_tells_what_its_mesh_is_worth_or_is_said_not_to(suffix, status, tmp_path):
     mesh_format = available(suffix)
-    known = lake(status=status, uniqueness="searched" if status == "certified" else None, backward_error=3e-16)
+    known = lake(verdict=verdict(status), backward_error=3e-16)
     known.save(tmp_path / f"mesh{suffix}")
     data = read(tmp_path / f"mesh{suffix}", mesh_format).point_data
     if said := lacks_worth(f"mesh{suffix}"):

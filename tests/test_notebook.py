@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 from scipy.sparse import csgraph
 
-from handmade import lake, solid, with_loose_row
+from handmade import lake, solid, verdict, with_loose_row
 from meshes import random_mesh, specimen
 from unassemble import InputError, recover
 
@@ -22,7 +22,7 @@ TRUE = specimen(*random_mesh(150, seed=5), c=2.0)
 
 
 BODY = solid("hexahedron")
-UNCERTIFIED = lake(status="uncertified", reason="a < b", advice="look there")
+UNCERTIFIED = lake(verdict=verdict("uncertified", "a < b", "look there"))
 
 
 @pytest.mark.parametrize("result", [lake(), BODY, with_loose_row(lake()), UNCERTIFIED])

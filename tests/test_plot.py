@@ -10,7 +10,7 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 
-from handmade import lake, recovery_of, two_pieces, with_loose_row
+from handmade import lake, recovery_of, two_pieces, verdict, with_loose_row
 from meshes import random_mesh
 from unassemble.errors import OutputError
 from unassemble.plot import (
@@ -55,7 +55,9 @@ def test_the_mesh_is_inside_and_round_things_stay_round():
 
 def test_misfits_and_hinges_are_marked():
     pairs = lake().triangles[:3, :2]
-    recovery = lake(status="uncertified", worst_entries=pairs, worst_misfits=np.ones(3), hinges=np.array([5, 9]))
+    recovery = lake(
+        verdict=verdict("uncertified"), worst_entries=pairs, worst_misfits=np.ones(3), hinges=np.array([5, 9])
+    )
     figure = plot_recovery(recovery)
     assert "uncertified" in words(figure)
     assert "entries that fit worst" in words(figure)
@@ -65,11 +67,12 @@ def test_misfits_and_hinges_are_marked():
 
 
 def test_points_without_coordinates_are_left_out(tmp_path):
-    recovery = with_loose_row(lake(status="uncertified"))
+    recovery = with_loose_row(lake(verdict=verdict("uncertified")))
     n = recovery.n_points
     worst = np.array([[0, n - 1], [n - 1, 1]])
     figure = plot_recovery(
-        with_loose_row(lake(status="uncertified", worst_entries=worst, worst_misfits=np.ones(2))), tmp_path / "a.png"
+        with_loose_row(lake(verdict=verdict("uncertified"), worst_entries=worst, worst_misfits=np.ones(2))),
+        tmp_path / "a.png",
     )
     assert np.isfinite(figure.axes[0].get_xlim()).all()
     assert "1 not determined" in words(figure)
@@ -169,7 +172,7 @@ def hinged(angle: float):
         boundary=np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2),
         boundary_offsets=np.array([0, 3, 6, 9]),
         node_status=np.zeros(8, np.int8),
-        status="uncertified",
+        verdict=verdict("uncertified"),
         worst_entries=np.array([[0, 4], [6, 5], [1, 5]]),
         worst_misfits=np.ones(3),
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handmade import lake, quadratic, solid, two_pieces, with_loose_row
+from handmade import lake, quadratic, solid, two_pieces, verdict, with_loose_row
 from unassemble.errors import NotPlanarError, OutputError
 from unassemble.report import build_report, check_report, failure_report, write_report
 from unassemble.summary import summary, three_lines
@@ -31,8 +31,7 @@ STABLE = {
 
 def uncertified():
     return lake(
-        status="uncertified",
-        reason="the re-assembled matrix differs",
+        verdict=verdict("uncertified", "the re-assembled matrix differs"),
         backward_error=np.inf,
         worst_entries=np.array([[3, 7], [1, 2]]),
         worst_misfits=np.array([0.5, np.nan]),
@@ -82,8 +81,8 @@ def test_a_failure_has_the_same_keys():
 def test_written_report_reads_back(tmp_path):
     path = tmp_path / "REPORT.JSON"
     path.write_text("old")
-    write_report(lake(reason="größer"), path)
-    assert json.loads(path.read_text(encoding="utf-8")) == build_report(lake(reason="größer"))
+    write_report(lake(verdict=verdict(reason="größer")), path)
+    assert json.loads(path.read_text(encoding="utf-8")) == build_report(lake(verdict=verdict(reason="größer")))
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -141,7 +140,7 @@ def test_bodies_of_several_elements_or_none():
 
 def test_points_without_cells_do_not_give_a_matrix_back():
     """What is held against the matrix then are equations of the rows away from supports."""
-    known = replace(solid("tetra"), status="uncertified", reason="why", backward_error=2e-6)
+    known = replace(solid("tetra"), verdict=verdict("uncertified", "why"), backward_error=2e-6)
     assert "give the matrix back to 2.0e-06 of each row's largest entry" in three_lines(known)
     bare = three_lines(replace(known, tetrahedra=np.empty((0, 4), np.int64)))
     assert bare.startswith("uncertified: 8 points agree with all rows away from supports to 2.0e-06 (relative)")

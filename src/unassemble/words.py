@@ -30,17 +30,29 @@ GIVE_NUMBERING = "give the numbering if it is known"
 WITHOUT_SUPPORTS = "assemble the matrix without supports, if that can be done"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Reason:
-    """Why an answer has its status, in two sentences at most, and what to do next, where there is anything to do."""
+    """Something that speaks for or against an answer, and what to do about it."""
 
-    text: str
-    advice: str = ""
+    #: The important one first. Each comes without its full stop, and beginning small.
+    sentences: tuple[str, ...]
+    #: What to do next, in one clause; empty where there is nothing to do.
+    advice: str
 
-    @classmethod
-    def of(cls, *parts: str, advice: str = "") -> Reason:
-        """Of sentences, the important one first; only two are kept."""
-        return cls(sentences(parts), advice)
+    def __init__(self, *sentences: str, advice: str = "") -> None:
+        object.__setattr__(self, "sentences", tuple(filter(None, sentences)))
+        object.__setattr__(self, "advice", advice)
+
+    def but(self, *, advice: str) -> Reason:
+        """The same with another advice."""
+        return Reason(*self.sentences, advice=advice)
+
+    def before(self, *sentences: str) -> Reason:
+        """The same, followed by further sentences."""
+        return Reason(*self.sentences, *sentences, advice=self.advice)
+
+    def __str__(self) -> str:
+        return sentences(self.sentences)
 
 
 def kind_text(euler: int, orientable: bool, loops: int) -> str:

@@ -15,6 +15,7 @@ from itertools import combinations, islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ..certificate import certify_mesh
 from ..clock import Clock
 from ..conforming.affine import expected
 from ..conforming.fit import Fitted, by_rule, corner_positions
@@ -24,14 +25,13 @@ from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.polish import PolishOptions, polish
-from ..recovery import ConformingMesh
-from ..scalar.held import held
+from ..recovery import ConformingMesh, Examined, Placed, finish
 from ..scalar.placement import Placement
 from ..tolerances import ALIKE, LITTLE, ROUNDED, SMALL
 from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
 from .fit import EXACT
-from .judge import determined_by, node_status, partly, unknowns
+from .judge import PartComparison, determined_by, node_status, partly, unknowns
 
 _MOST = 3  # sets of cells, the likeliest ones
 _AT_FIRST, _THEN = (1.0, 0.1, 0.01), (1e-3, 1e-4, *[1e-5] * 5)  # weights of what is guessed
@@ -87,27 +87,26 @@ def _report(
     topology = Topology(matrix.n, matrix.edges, tuple(one.part.piece for one in own), "cliques")
     told = [(fit.fit.part.piece.vertices, fit.nodes) for fit in fits]
     placement, said = placement.upon(topology, [known for _, known in told])
-    with clock("place"):
+    pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
+
+    def place() -> Placed[ConformingMesh]:
         placed, origins, notes = placement.placed(topology, [fit.nodes for fit in own], [fit.notes for fit in own])
         mesh = joined(topology, own, placed, placement)
         shift = origins[mesh.component]
-        mesh = replace(mesh, points=mesh.points + np.column_stack([shift.real, shift.imag]))
-    status = node_status(mesh.component, told)
-    with clock("certify"):
-        pairs = np.concatenate([fit.fit.part.rows[fit.judged] for fit in fits])
-        spare = min(fit.spare for fit in fits if fit.known.any())
+        points = mesh.points + np.column_stack([shift.real, shift.imag])
+        mesh = replace(mesh, points=points, node_status=node_status(mesh.component, told))
+        return Placed(mesh, (*matrix.warnings, *said, *notes))
+
+    def compare(mesh: ConformingMesh) -> PartComparison:
+        return PartComparison(certify_mesh(matrix, mesh, placement.coefficients), pairs)
+
+    def examine(mesh: ConformingMesh, compared: PartComparison) -> Examined:
+        status, spare = mesh.node_status, min(fit.spare for fit in fits if fit.known.any())
         claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.cells.values()])
-        found = held(matrix, mesh, placement.coefficients)
-        verdict = partly(status, found, claimed, pairs, spare, bars=options.standard_deviations)
-    if verdict is None:
-        return None
-    fields, loose = verdict
-    return replace(
-        mesh,
-        **fields,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *said, *notes, *loose),
-    )
+        return partly(status, compared, claimed, spare, bars=options.standard_deviations)
+
+    found = finish(clock, place, compare, examine)
+    return found if found.certified else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,20 +13,21 @@ with one factorisation and no basis of all of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..certificate import Certificate
+from ..certificate import Certificate, Findings
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
-from ..tolerances import CERTIFIED, ROUNDED
+from ..recovery import Examined
+from ..tolerances import ROUNDED
 from ..topology import Piece
 from ..topology.keys import pair_keys
-from ..words import count_of
+from ..words import Reason, count_of
 from .fit import WholeEntries, jacobian_rows
 
 
@@ -94,31 +95,56 @@ def node_status(component: NDArray[np.int64], parts: Sequence[tuple[NDArray, NDA
     return status
 
 
-def partly(
-    status: NDArray[np.int8], held: Certificate, claimed: NDArray[np.bool_], pairs: NDArray, spare: int,
-    told: str = "", *, bars: bool,
-) -> tuple[dict[str, Any], list[str]] | None:  # fmt: skip
-    """What is said of a mesh that whole entries at pairs (k, 2) determine where status (n,) is 0.
+@dataclass(frozen=True, eq=False)
+class PartComparison:
+    """A mesh compared with the entries that are whole, of all those of its matrix."""
 
-    None unless it gives them back, some of them to `spare`, and no `claimed` cell, (m,) bool, is turned over.
+    certificate: Certificate
+    pairs: NDArray[np.int64]  # (k, 2) the whole entries at points that are determined
+
+    @property
+    def backward_error(self) -> float:
+        """The largest misfit of a whole entry."""
+        n = int(self.certificate.pairs.max(initial=0)) + 1
+        place = np.searchsorted(self.certificate.pairs @ [n, 1], pair_keys(n, *self.pairs.T))
+        return float(self.certificate.misfits[place].max(initial=0.0))
+
+    def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Entries that fit worst, whole or not, and their misfits."""
+        return self.certificate.worst(count)
+
+
+def partly(
+    status: NDArray[np.int8],
+    compared: PartComparison,
+    claimed: NDArray[np.bool_],
+    spare: int,
+    told: str = "",
+    *,
+    bars: bool,
+) -> Examined:
+    """What is said of a mesh that whole entries determine where status, (n,), is 0.
+
+    Certified if it gives them back, some of them to `spare`, and no `claimed` cell, (m,) bool, is turned over. `told`
+    names what else than points was found, and `bars` says whether standard deviations were asked for.
     """
-    n = len(status)
-    place = np.searchsorted(held.pairs @ [n, 1], pair_keys(n, *pairs.T))
-    error = float(held.misfits[place].max(initial=0.0))
-    if claimed[held.flipped].any() or not (error <= CERTIFIED and spare > 0):
-        return None
+    error, count = compared.backward_error, len(compared.pairs)
     known, plausible = int((status == 0).sum()), int((status == 2).sum())
-    reason = (
-        f"{known:,} of {len(status):,} points are determined by {len(pairs):,} whole entries, which the operator "
+    fits = (
+        f"{known:,} of {len(status):,} points are determined by {count:,} whole entries, which the operator "
         f"re-assembled on them{told} gives back to {error:.1e} (relative)"
     )
+    objections = []
+    if claimed[compared.certificate.flipped].any():
+        objections.append(Reason("cells are turned over"))
+    if not spare > 0:
+        objections.append(Reason(f"{fits}, but no entries are to spare"))
     note = (
         f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to "
         "unknowns that were taken out, or that other terms share, entries do not determine them"
     )
     notes = [note] * bool(plausible) + ["standard deviations are not computed of parts of a mesh, or of regions"] * bars
-    fields = {"status": "certified", "uniqueness": "searched", "reason": reason}
-    return fields | {"node_status": status, "backward_error": error}, notes
+    return Examined(Findings((fits,), error, tuple(objections)), notes)
 
 
 def _judged(

@@ -1,17 +1,19 @@
 """Scalar matrices that are a part of a grid."""
 
-from dataclasses import replace
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
-from ..certificate import Terms, certify
+from ..certificate import Certificate, Findings, Terms, certify
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..recovery import ConformingMesh, PlanarMesh
+from ..recovery import ConformingMesh, Examined, Placed, PlanarMesh, finish
 from ..scalar.joined import joined
 from ..scalar.notes import vanished_notes
 from ..scalar.placement import Placement
@@ -19,7 +21,7 @@ from ..tolerances import CERTIFIED
 from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
-from ..words import count_of
+from ..words import Reason, count_of
 from .lattice import Lattice
 
 _RULES = {"quad": "2 x 2 Gauss", "triangle": "degree 2"}
@@ -53,43 +55,122 @@ def recover_lattice(
     topology = _topology(n, matrix.edges[kept[matrix.edges].any(axis=1)], cells, bilinear=lattice.bilinear)
     if topology is None or (topology.multiplicity[own] == 0).any():
         return None
-    (piece,), tensor = topology.pieces, placement.tensor
     status[topology.multiplicity == 0] = 1
-    with clock("place"):
-        placement, loose = placement.upon(topology, [status[piece.vertices] == 0])
-        z = np.full(n + int((row >= n).sum()), np.nan, dtype=np.complex128)
-        z[row] = (lattice.z - lattice.z.mean()) / np.ptp(lattice.z.real)  # of size one: else digits are lost below
+    part = _LatticePart(matrix, own, lattice, row, cells, topology, status, placement, options)
+    found = finish(clock, part.place, part.compare, part.examine)
+    return None if found.verdict.objections else found
+
+
+@dataclass(eq=False)
+class _LatticePart:
+    """A lattice whose vertices have rows, `row`, where they have any: where it is put, and what it is worth there."""
+
+    matrix: OperatorMatrix
+    own: NDArray[np.int64]  # (k,) rows whose entries are those of the lattice
+    lattice: Lattice
+    row: NDArray[np.int64]  # of each vertex; n and more for those that are gone
+    cells: NDArray[np.int64]  # (m, 3 or 4) rows of the corners of all cells
+    topology: Topology
+    status: NDArray[np.int8]
+    placement: Placement
+    options: ScalarOptions
+
+    def place(self) -> Placed[PlanarMesh]:
+        """The piece that has rows, and the vertices that are gone by the same map."""
+        lattice, topology, n = self.lattice, self.topology, self.matrix.n
+        (piece,) = topology.pieces
+        placement, loose = self.placement.upon(topology, [self.status[piece.vertices] == 0])
+        z = np.full(n + int((self.row >= n).sum()), np.nan, dtype=np.complex128)
+        z[self.row] = (lattice.z - lattice.z.mean()) / np.ptp(lattice.z.real)  # of size one: else digits are lost below
         placed, notes = placement.apply(piece, z[piece.vertices])
-        mesh = joined(topology, [placed], np.array([lattice.scale / placement.stretch]), placement.operator)
+        factor = np.array([lattice.scale / placement.stretch])
+        mesh = joined(topology, [placed], factor, placement.operator)
         affine = np.column_stack([z, np.conj(z), np.ones(len(z))])
         gone = affine[n:] @ np.linalg.lstsq(affine[piece.vertices], placed, rcond=None)[0]
-    with clock("certify"):
-        points = np.append(mesh.points @ [1, 1j], gone)
-        a, b, c = points[cells[0, :3]]
-        cells = cells if (np.conj(b - a) * (c - a)).imag > 0 else cells[:, ::-1]  # turned over as a whole
-        error = _backward_error(matrix, own, tensor.to_laplacian(points) if tensor else points, cells, lattice)
-    if not error <= CERTIFIED:
-        return None
-    if options.triangulate:
-        mesh = mesh.triangulated()
-    if lattice.bilinear:
-        quads = cells[(cells < n).all(axis=1)]
+        mesh = replace(mesh, node_status=self.status, eliminated_points=np.column_stack([gone.real, gone.imag]))
+        said = (*self.matrix.warnings, *_notes(lattice, self.status), *loose, *notes, *vanished_notes(topology))
+        return Placed(self._with_cells(mesh), said)
+
+    def _with_cells(self, mesh: PlanarMesh) -> PlanarMesh:
+        """The mesh with quadrilaterals where these are elements, or polygons divided if that was asked for."""
+        if self.options.triangulate:
+            mesh = mesh.triangulated()
+        if not self.lattice.bilinear:
+            return mesh
+        cells = self._right_side_out(mesh)
+        quads = cells[(cells < self.matrix.n).all(axis=1)]
         more = {"triangles": quads[:0, :3], "quads": quads, "quadrature": _RULES["quad"], "straight": True}
-        mesh = ConformingMesh(**(vars(mesh) | more))
-    return replace(
-        mesh,
-        node_status=status,
-        status="ambiguous" if lattice.like_mass else "certified",
-        uniqueness="ambiguous",
-        reason=(
-            f"the grid, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
-            f"the matrix back to {error:.1e} (relative), row sums included"
-        ),
-        backward_error=error,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *_notes(lattice, status), *loose, *notes, *vanished_notes(topology)),
-        eliminated_points=np.column_stack([gone.real, gone.imag]),
-    )
+        return ConformingMesh(**(vars(mesh) | more))
+
+    def _right_side_out(self, mesh: PlanarMesh) -> NDArray[np.int64]:
+        """The cells, turned over as a whole where the mesh is a mirror image."""
+        (ax, ay), (bx, by), (cx, cy) = self._all_points(mesh)[self.cells[0, :3]]
+        right = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) > 0
+        return self.cells if right else self.cells[:, ::-1]
+
+    @staticmethod
+    def _all_points(mesh: PlanarMesh) -> NDArray[np.float64]:
+        """Those with rows, and those without."""
+        return np.concatenate([mesh.points, mesh.eliminated_points])
+
+    def compare(self, mesh: PlanarMesh) -> LatticeComparison:
+        """Entries and diagonal entries, which say how much is gone, of the rows that are the lattice's."""
+        lattice, points = self.lattice, self._all_points(mesh)
+        diagonal, size = np.zeros(len(points)), np.full(len(points), np.inf)
+        diagonal[self.own] = self.matrix.diagonal[self.own] - lattice.added
+        size[self.own] = self.matrix.row_size[self.own]
+        cells = self._right_side_out(mesh)
+        name, shapes = ("quad", cells) if lattice.bilinear else ("triangle", _divided(cells))
+        found = certify(
+            self.matrix.edges,
+            self.matrix.entries,
+            points,
+            {name: shapes},
+            {name: np.full(len(shapes), mesh.scale[0])},
+            rules=_RULES,
+            tensor=self.placement.coefficients,
+            terms=Terms(diagonal),
+        )
+        return LatticeComparison(found, size, self.matrix.n)
+
+    def examine(self, mesh: PlanarMesh, compared: LatticeComparison) -> Examined:
+        """It is the only grid; a multiple of the identity may be a mass matrix, which other lattices fit."""
+        error = compared.backward_error
+        gone = count_of(len(mesh.eliminated_points), "vertex that has", "vertices that have")
+        fits = (
+            f"the grid, continued by {gone} no row, gives the matrix back to {error:.1e} (relative), row sums included"
+        )
+        flat = Reason("cells are flat or turned over")
+        mass = "with a consistent mass matrix in place of what was added to the diagonal, another lattice fits as well"
+        return Examined(
+            Findings(
+                fits=(fits,),
+                error=error,
+                objections=(flat,) if len(compared.certificate.flipped) else (),
+                another=Reason(fits, mass) if self.lattice.like_mass else None,
+                unique="conventional",
+            )
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeComparison:
+    """A lattice compared with those rows of a matrix that are its own."""
+
+    certificate: Certificate
+    size: NDArray[np.float64]  # of all vertices the largest off-diagonal entry of the row; infinite for other rows
+    n: int  # vertices that have rows, which come first
+
+    @property
+    def backward_error(self) -> float:
+        """The largest misfit, relative to the largest off-diagonal entry of its row."""
+        held = self.certificate
+        errors = np.abs(held.differences) / self.size[held.pairs].min(axis=1)
+        return float(errors[(held.pairs < self.n).all(axis=1)].max(initial=0.0))
+
+    def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """None: a lattice that does not fit is no answer."""
+        return np.empty((0, 2), np.int64), np.empty(0)
 
 
 def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
@@ -110,23 +191,6 @@ def _notes(lattice: Lattice, status: NDArray[np.int8]) -> list[str]:
             "two rows that were replaced can change places"
         )
     return notes
-
-
-def _backward_error(
-    matrix: OperatorMatrix, own: NDArray[np.int64], z: NDArray, cells: NDArray[np.int64], lattice: Lattice
-) -> float:
-    """Of entries, and of diagonal entries, which say how much is gone, of the rows `own`, (k,).
-
-    Relative to the largest off-diagonal entry of each row; infinite where a cell is flat or turned over. `z` are the
-    points that the Laplacian has, those of the vertices that are gone last.
-    """
-    diagonal, size = np.zeros(len(z)), np.full(len(z), np.inf)
-    diagonal[own], size[own] = matrix.diagonal[own] - lattice.added, matrix.row_size[own]
-    name, shapes = ("quad", cells) if lattice.bilinear else ("triangle", _divided(cells))
-    points, factors = np.column_stack([z.real, z.imag]), {name: np.full(len(shapes), lattice.scale)}
-    found = certify(matrix.edges, matrix.entries, points, {name: shapes}, factors, rules=_RULES, terms=Terms(diagonal))
-    errors = np.abs(found.differences) / size[found.pairs].min(axis=1)
-    return np.inf if len(found.flipped) else float(errors[(found.pairs < matrix.n).all(axis=1)].max())
 
 
 def _topology(n: int, stored: NDArray[np.int64], cells: NDArray[np.int64], *, bilinear: bool) -> Topology | None:

@@ -5,6 +5,16 @@ Nothing here knows how a mesh was found: the room imports no solver and no recov
 
 from .comparison import Certificate as Certificate, Terms as Terms, compared as compared
 from .lengths import MetricCertificate as MetricCertificate, certify_metric as certify_metric
+from .masses import certify_masses as certify_masses
 from .noise import chi_square_verdict as chi_square_verdict
-from .planar import certify as certify
+from .planar import certify as certify, certify_mesh as certify_mesh
 from .spare import without_spare_equations as without_spare_equations
+from .verdict import (
+    UNJUDGED as UNJUDGED,
+    Findings as Findings,
+    Status as Status,
+    Unique as Unique,
+    Uniqueness as Uniqueness,
+    Verdict as Verdict,
+    judge as judge,
+)

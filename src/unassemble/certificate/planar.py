@@ -1,7 +1,10 @@
 """Planar meshes of any element: the operator re-assembled on the mesh as written, held against the matrix."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,30 @@ from ..budget import AT_ONCE
 from .comparison import Certificate, Terms, compared
 from .elements import corners_of, functions, masses, rule_of
 
+if TYPE_CHECKING:
+    from ..matrix import OperatorMatrix
+    from ..recovery import PlanarMesh
+
 _CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
+
+
+def certify_mesh(
+    matrix: OperatorMatrix,
+    mesh: PlanarMesh,
+    tensor: tuple[float, float, float] | None = None,
+    terms: Terms | None = None,
+) -> Certificate:
+    """A planar mesh as it is written, compared with its matrix.
+
+    Off-diagonal entries are compared or, with further `terms`, all of them; `tensor` is kxx, kxy and kyy.
+    """
+    blocks = mesh.cells_to_assemble
+    if mesh.region is not None:
+        factors = {"triangle": mesh.scale[mesh.region]}
+    else:  # a vertex of several pieces has the lowest label
+        factors = {kind: mesh.scale[mesh.component[cells].max(axis=1)] for kind, cells in blocks.items()}
+    given = matrix.edges, matrix.entries, mesh.points
+    return certify(*given, blocks, factors, rules=mesh.rules, tensor=tensor, terms=terms)
 
 
 def certify(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
+from ..certificate import Unique
 from ..clock import Clock
 from ..elements.surface import fields_of
 from ..errors import GeometryError, SolverError, TopologyError
@@ -22,6 +23,7 @@ from ..scalar.recover import finished, small
 from ..scalar.solving import Solved, Task
 from ..topology import Topology, local_numbering
 from ..topology.keys import distinct, pair_keys
+from ..words import Reason
 from .fit import Fitted, fitted
 from .parts import Part, parts_of, reversal
 from .roles import Cells, ordered_cells
@@ -71,7 +73,7 @@ def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:
     ]
     reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
     other_cells = (Alternative(differ[0], differ[1]),)
-    return replace(one, status="ambiguous", uniqueness="ambiguous", reason=reason, alternatives=other_cells)
+    return replace(one, verdict=one.verdict.beside(Reason(reason)), alternatives=other_cells)
 
 
 def shown_cells(
@@ -102,13 +104,14 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         own = [piece.edge_rows for piece in topology.pieces]
         fits = [fitted(part, -matrix.entries[o], errors[o], task) for part, o in zip(parts, own, strict=True)]
     spare = np.array([fit.freedom for fit in fits])
-    models, uniqueness = [fit.entries for fit in fits], "proved" if cells.told else "searched"
+    models = [fit.entries for fit in fits]
+    unique: Unique = "proved" if cells.told else "searched"
 
     def drawn(placed: list[NDArray]) -> PlanarMesh:
         return joined(topology, fits, placed, task.placement)
 
     solved = Solved(stored, matrix, topology, fits, models, spare, task, task.noise)
-    return finished(solved, drawn, lambda _: ([], uniqueness), (), clock)
+    return finished(solved, drawn, lambda _: ([], unique), (), clock)
 
 
 def _with_zeros(stored: OperatorMatrix, parts: Sequence[Part]) -> tuple[OperatorMatrix, Topology]:

@@ -120,5 +120,7 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
         if linear or mesh.chi_square is not None or mesh.uniqueness or mesh.backward_error <= CERTIFIED:
             return mesh
         advice = _where_nothing_fits(found, matrix)
-        return replace(mesh, reason=sentences([mesh.reason.split(". ")[0], *found.evidence[-1:]]), advice=advice)
-    return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)
+        reasons = mesh.verdict.reasons[0], *found.evidence[-1:]
+        return replace(mesh, verdict=mesh.verdict.explained(*reasons, advice=advice))
+    reasons = f"the matrix is {found.name}", *found.evidence
+    return replace(mesh, verdict=mesh.verdict.explained(*reasons, advice=found.advice))

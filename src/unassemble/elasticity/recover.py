@@ -6,16 +6,17 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..certificate import Findings
 from ..elements.surface import fields_of
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..nodes.anchoring import Request, anchored
+from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
-from ..recovery import Body
+from ..recovery import Body, Examined, Placed, Residual, finish
 from ..tolerances import ALIKE, CERTIFIED
-from ..words import Reason
+from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
@@ -23,7 +24,7 @@ from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, no_positions, verdict
+from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, examined, no_positions
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -71,20 +72,21 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     if rounding and near and not any(solution.freedoms):
         with request.clock("certify"):
             bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
-    status, reason = verdict(nodal, solution, error, found, numbering, rounding, bar)
-    alone = status == "certified" and not found.certified
+    sure, objections = examined(nodal, solution, error, found, numbering, rounding, bar)
+    alone = not objections and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))
     simplex = nodal.n <= nodal.dim + 1  # whose rows may all depend on one
     if alone and (simplex or not (determined(solution.points) & ~lone).any()):
-        status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
+        objections.append(NOTHING_CHECKED)
+        lone = np.zeros_like(lone)
     withheld = np.zeros(nodal.n, dtype=bool)
-    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
+    if not objections and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, solution.points, found.shown)
     hanging = unborne(nodal, solution, found)
     if hanging.any() and (hanging | withheld | ~determined(solution.points)).all():
-        status, reason = "uncertified", RESTS_ON_PLANES
+        objections.insert(0, RESTS_ON_PLANES)
         hanging = np.zeros(nodal.n, dtype=bool)  # said of all of them
     kept = ~(withheld | hanging | lone)
     placed = np.where(kept[:, None], solution.points, np.nan)
@@ -93,37 +95,47 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     component = np.where(loose, -1, solution.component)
     bulk, shear = np.abs(found.lame).T
     bodies = [placed[component == k] for k in range(component.max(initial=-1) + 1)]
-    for against, why in (
-        (loose.all(), NOTHING_CHECKED),
-        (any(map(_flat, bodies)), Reason("the points lie in one line or plane, and no solid body does")),
-        ((shear <= ALIKE * bulk).any(), Reason("elements have no shear stiffness: any vectors that cancel are such")),
-    ):
-        if status == "certified" and against:
-            status, reason = "uncertified", why
+    if loose.all():
+        objections.append(NOTHING_CHECKED)
+    if any(map(_flat, bodies)):
+        objections.append(Reason("the points lie in one line or plane, and no solid body does"))
+    if (shear <= ALIKE * bulk).any():
+        objections.append(Reason("elements have no shear stiffness: any vectors that cancel are such"))
     guessed = guessed_directions(numbering, loose)
     masks, asked = (withheld, hanging, lone), shown if cells else None
     said = (*solution.warnings, *notes(nodal, solution, asked, loose, masks, int(guessed.sum())))
     rows = replace(numbering, direction_of_row=np.where(guessed, -1, numbering.direction_of_row))
     free = "the sign of the scale is free: with a mesh its point reflection fits the matrix as well"
-    factor, shared = anchored(
-        request, rows, placed, component, solution.evidence, (status, reason), 1.0, notes=said, free=free
-    )
+    another = None
     if len(nodal.indices) == nodal.n**2 and numbering.kind != "given":
         # Of a rectangle, say, rows along y with those of opposite corners: those of its mirror image.
-        other = "all nodes are coupled, as those of one element: which rows are of one node may be another choice"
-        shared["warnings"] += (other,)
-        shared["uniqueness"] = shared["uniqueness"] and "ambiguous"
-    lame, scale = _in_units(shown, component, factor, nodal.dim)
-    return Body(
-        **fields_of(shown.blocks),
-        **shared,
-        scale=scale,
-        operator="elasticity",
-        backward_error=found.backward_error if found.certified else error,
-        position_error=bar.error if bar and bar.explained else None,
-        poisson_ratio=None if ratio is None else poisson_ratio(ratio),
-        lame=lame,
-    )
+        another = Reason(
+            f"{sure}, but all nodes are coupled, as those of one element",
+            "which rows are of one node may be another choice",
+            advice=GIVE_NUMBERING,
+        )
+
+    def place() -> Placed[Body]:
+        moved = anchored(request, rows, placed, component, 1.0, free=free)
+        objections.extend(moved.objections(sure))
+        lame, scale = _in_units(shown, component, moved.factor, nodal.dim)
+        body = Body(
+            **fields_of(shown.blocks),
+            **mechanical_fields(request, rows, moved.points, component, solution.evidence),
+            scale=scale,
+            operator="elasticity",
+            position_error=bar.error if bar and bar.explained else None,
+            poisson_ratio=None if ratio is None else poisson_ratio(ratio),
+            lame=lame,
+        )
+        return Placed(body, (*request.matrix.warnings, *said, *moved.notes))
+
+    def examine(_: Body, compared: Residual) -> Examined:
+        allowed = np.inf if rounding else CERTIFIED
+        return Examined(Findings((sure,), compared.backward_error, tuple(objections), another, allowed=allowed))
+
+    held = Residual(found.backward_error if found.certified else error)
+    return finish(request.clock, place, lambda _: held, examine)
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:

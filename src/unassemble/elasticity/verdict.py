@@ -1,8 +1,6 @@
 """Whether coordinates are certified, and why not."""
 
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,10 +15,12 @@ from .materials.cells import Cells
 from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
-NOTHING_CHECKED = Reason("no identities have others to check against, and no elements re-assemble", WITHOUT_SUPPORTS)
+NOTHING_CHECKED = Reason(
+    "no identities have others to check against, and no elements re-assemble", advice=WITHOUT_SUPPORTS
+)
 RESTS_ON_PLANES = Reason(
     "too much is free unless nodes that lack a direction lie in planes across it, and no elements show that they do",
-    WITHOUT_SUPPORTS,
+    advice=WITHOUT_SUPPORTS,
 )
 
 
@@ -30,7 +30,7 @@ def no_positions(why: object) -> str:
     return sentences([f"no positions were found: {why}", blame])
 
 
-def verdict(
+def examined(
     nodal: NodalMatrix,
     solution: Solution,
     error: float,
@@ -38,31 +38,31 @@ def verdict(
     numbering: Numbering,
     rounding: Rounding | None,
     known: Known | None,
-) -> tuple[str, Reason]:
-    """Status and reason, by the largest residual of a valid identity and the cells that were found.
+) -> tuple[str, list[Reason]]:
+    """What speaks for positions, in a sentence, and what against them.
 
-    `rounding` of entries is an error bar: how well positions are `known` with it, None where that was not asked.
+    By the largest residual of a valid identity and the cells that were found. `rounding` of entries is an error bar:
+    how well positions are `known` with it, None where that was not asked.
     """
     holds = f"the valid identities hold to {error:.1e} (relative)"
     shown = known is None and found.certified and found.backward_error <= CERTIFIED
-    objections = _to_positions(nodal, solution, numbering, exact=known is None)
+    objections = list(_to_positions(nodal, solution, numbering, exact=known is None))
     if not shown:
-        objections = chain(objections, _to_identities(nodal, solution, error, numbering))
-    objection = next(objections, None)
+        objections += _to_identities(nodal, solution, error, numbering)
     if shown:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         sure = f"the matrix re-assembled on the {count} is the given one"
     elif rounding and known:
         sure = holds + known.within(rounding)
-        objection = objection or known.objection(error, rounding, holds)
+        objections += known.objections(error, rounding, holds)
     else:
         sure = "the valid identities hold to rounding, and only translations and scale satisfy them"
-        objection = objection or (Reason(holds) if error > CERTIFIED else None)
-        objection = objection or (_soft(solution) if error > _MAGNIFIED * _softest(solution) else None)
-    if objection and rounding:
+        objections += [Reason(holds)] if error > CERTIFIED else []
+        objections += [_soft(solution)] if error > _MAGNIFIED * _softest(solution) else []
+    if objections and rounding:
         more = f"write more digits of the entries: they are rounded to {rounding.name}, which may hide what rows lack"
-        objection = replace(objection, advice=more)
-    return ("uncertified", objection) if objection else ("certified", Reason(sure))
+        objections[0] = objections[0].but(advice=more)
+    return sure, objections
 
 
 def _softest(solution: Solution) -> float:
@@ -75,9 +75,7 @@ def _soft(solution: Solution) -> Reason:
     free = (
         f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and nodes "
     )
-    return Reason.of(
-        free + "that it moves may be wrong", "slender bodies have such fields, and nodes that few rows hold"
-    )
+    return Reason(free + "that it moves may be wrong", "slender bodies have such fields, and nodes that few rows hold")
 
 
 def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool) -> Iterator[Reason]:
@@ -85,10 +83,10 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
     if any(solution.freedoms):
         unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
         larger = "an affine map stays free, since the material around every valid row is homogeneous"
-        yield Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
+        yield Reason(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
     if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
-        yield Reason.of(
+        yield Reason(
             f"no exact null vector exists (singular value {worst.residual:.1e}, of the next field {worst.gap:.1e})",
             "the points are the best fit, as of materials that are not isotropic, or nodes that are tied together",
         )
@@ -96,7 +94,7 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
         yield _soft(solution)
     if _torn(nodal, solution):
         torn = "coupled nodes came out as separate pieces, and how these lie to each other is not known"
-        yield Reason.of(torn, "rows between them lack entries, or belong to other axes or nodes", advice=GIVE_NUMBERING)
+        yield Reason(torn, "rows between them lack entries, or belong to other axes or nodes", advice=GIVE_NUMBERING)
 
 
 def _to_identities(nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering) -> Iterator[Reason]:
@@ -105,13 +103,13 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, error: float, numberi
         yield Reason("elements told the axes of a homogeneous body, but re-assembled the matrix is not the given one")
     if numbering.likely:
         likely = "which rows belong to one node was inferred, and no elements that re-assemble show that it is right"
-        yield Reason(likely, GIVE_NUMBERING)
+        yield Reason(likely, advice=GIVE_NUMBERING)
     # Without a trace, doubtful ones aside, which get no coordinates.
     odd = int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
     if odd:
         nodes = count_of(odd, "node lacks", "nodes lack")
         lacking = f"{nodes} directions although no row next to it misses anything: its rows belong to other nodes"
-        yield Reason(lacking, GIVE_NUMBERING)
+        yield Reason(lacking, advice=GIVE_NUMBERING)
     if np.isnan(error):
         yield NOTHING_CHECKED
 

@@ -20,7 +20,6 @@ from ..matrix import as_csr, is_file, read_matrix
 from ..matrix.digits import Digits
 from ..recovery import Body, PlanarMesh, Recovery
 from ..tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
-from ..words import sentences
 from .cells import mass_matrix, weights_at
 
 
@@ -88,7 +87,8 @@ def weighed(
     if not sized:
         root = "sqrt(rho)" if found.dim == 2 else "the cube root of rho"
         notes += (f"the mesh has the size of density 1: if that is rho, lengths are those given here over {root}",)
-    return replace(found, density=density, warnings=notes, reason=sentences([found.reason.split(". ")[0], said]))
+    verdict = found.verdict.explained(found.verdict.reasons[0], said)
+    return replace(found, density=density, warnings=notes, verdict=verdict)
 
 
 def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:

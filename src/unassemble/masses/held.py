@@ -1,23 +1,24 @@
 """What all terms have in common: the row sums that show them, and a mesh held against the whole matrix."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certificate import Terms
+from ..certificate import Certificate, Findings, Terms, Verdict, certify_mesh
+from ..clock import Clock
 from ..matrix import OperatorMatrix
-from ..recovery import PlanarMesh
-from ..scalar.held import held
+from ..recovery import Examined, Placed, PlanarMesh, finish
 from ..tolerances import CERTIFIED, SIGMAS
+from ..words import Reason
 
 Plain = Callable[..., PlanarMesh]
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class RowSums:
     """A matrix, its row sums, of which c L has none and s M the integrals of s times its basis functions, and a tensor.
 
     `tensor`: (kxx, kxy, kyy) to be undone.
@@ -25,6 +26,7 @@ class Held:
 
     matrix: OperatorMatrix
     tensor: tuple[float, float, float] | None = None
+    clock: Clock = field(default_factory=Clock)
 
     @cached_property
     def rounding(self) -> NDArray[np.float64]:
@@ -45,30 +47,41 @@ class Held:
 
     def with_terms(self, found: PlanarMesh, terms: Terms, operator: str, *notes: str, unproved: str = "") -> PlanarMesh:
         """The mesh of the Laplacian as that of the whole matrix, if it gives that back; `unproved`: what is not."""
-        if unproved:
-            notes += (unproved,) if found.certified else ()
-            found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
+        if unproved and found.certified:
+            notes += (unproved,)
         if terms.reaction:
             notes = (
                 "the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
                 f"sqrt({terms.reaction:.12g} / s)",
                 *notes,
             )
-        certificate = held(self.matrix, found, self.tensor, terms)
-        good = certificate.backward_error <= CERTIFIED and not len(certificate.flipped)
-        fits = (
-            f"{operator} re-assembled on this mesh gives the matrix back to {certificate.backward_error:.1e} (relative)"
+
+        def examine(_: PlanarMesh, whole: Certificate) -> Examined:
+            error, known = whole.backward_error, found.verdict
+            fits = f"{operator} re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
+            return Examined(
+                Findings(
+                    fits=(fits,),
+                    error=error,
+                    objections=tuple(_objections(whole, fits, known)),
+                    another=Reason(fits, *known.reasons, advice=known.advice) if known.status == "ambiguous" else None,
+                    unique="searched" if unproved else known.unique,
+                )
+            )
+
+        return finish(
+            self.clock,
+            lambda: Placed(
+                replace(found, reaction=terms.reaction, row_scaling=terms.scaling), (*found.warnings, *notes)
+            ),
+            lambda mesh: certify_mesh(self.matrix, mesh, self.tensor, terms),
+            examine,
         )
-        worst, misfits = certificate.worst(0 if good and found.certified else 10)
-        return replace(
-            found,
-            reaction=terms.reaction,
-            row_scaling=terms.scaling,
-            status=found.status if good else "uncertified",
-            uniqueness=found.uniqueness if good else None,
-            reason=fits if good and found.certified else f"{fits}, but {found.reason}" if good else f"{fits} only",
-            backward_error=certificate.backward_error,
-            warnings=(*found.warnings, *notes),
-            worst_entries=worst,
-            worst_misfits=misfits,
-        )
+
+
+def _objections(whole: Certificate, fits: str, known: Verdict) -> Iterator[Reason]:
+    """What speaks against a mesh as that of the whole matrix; `known` is what it is worth as that of the Laplacian."""
+    if not whole.backward_error <= CERTIFIED or len(whole.flipped):
+        yield Reason(f"{fits} only", advice=known.advice)
+    elif known.objections:
+        yield Reason(fits, *known.reasons, advice=known.advice)

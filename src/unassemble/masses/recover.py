@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..certificate import Terms
+from ..certificate import Certificate, Findings, Terms, certify_masses
 from ..clock import Clock
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
@@ -24,12 +24,12 @@ from ..linalg import UpperTriangle, nearly_singular
 from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
-from ..recovery import PlanarMesh
+from ..recovery import Examined, Placed, PlanarMesh, finish
 from ..tolerances import ALIKE, CERTIFIED, SUMMED
 from ..topology import Topology
 from ..topology.surface import Together
 from .cells import TRIANGLE, evenly, guessed_from_sums, less, mass_matrix, told_without_stiffness, weights_at
-from .held import Held, Plain
+from .held import Plain, RowSums
 from .lengths import fit_areas
 from .settled import less_mass, settled
 
@@ -42,7 +42,7 @@ def recover_with_terms(
     `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
     `tensor`: (kxx, kxy, kyy) to be undone.
     """
-    held, found = Held(matrix, tensor), None
+    held, found = RowSums(matrix, tensor, clock), None
     if not held.has_sums.any():
         return plain(matrix)
     with clock("topology"):
@@ -69,7 +69,7 @@ def recover_elements_with_terms(
 
     `of_cells`: recovers a matrix c L + D on cells that its rows may form.
     """
-    held = Held(matrix)
+    held = RowSums(matrix, clock=clock)
     if not held.has_sums.any():
         return None
     try:
@@ -104,7 +104,7 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
     return True
 
 
-def _unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
+def _unscaled(held: RowSums, plain: Plain, clock: Clock) -> PlanarMesh | None:
     """The mesh of S c L S; None where no positive vector is annihilated."""
     matrix = held.matrix
     with clock("scaling"):
@@ -135,7 +135,7 @@ def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
     return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * (abs(scaled) @ np.abs(x))).all() else None
 
 
-def _mass_alone(held: Held, topology: Topology, triangles: NDArray, opposite: NDArray) -> PlanarMesh | None:
+def _mass_alone(held: RowSums, topology: Topology, triangles: NDArray, opposite: NDArray) -> PlanarMesh | None:
     """Areas of triangles (m, 3) of a mass matrix; None where areas do not explain it.
 
     There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
@@ -152,27 +152,36 @@ def _mass_alone(held: Held, topology: Topology, triangles: NDArray, opposite: ND
     error = float(max(np.abs(left.entries / matrix.entries).max(), np.abs(left.diagonal / matrix.diagonal).max()))
     if not (error <= CERTIFIED and (sign * areas > 0).all()):
         return None
-    return PlanarMesh(
+    mesh = PlanarMesh(
         points=np.full((matrix.n, 2), np.nan),
         triangles=triangles,
         component=topology.component,
         hinges=topology.hinges,
         scale=np.zeros(len(topology.pieces)),
         node_status=np.ones(matrix.n, dtype=np.int8),
-        status="certified",
-        uniqueness="proved",
-        reason=f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative). A mass "
-        "matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do",
         operator="mass",
-        backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),
         reaction=1.0,
         areas=areas,
-        warnings=("the areas are those times s, if the factor of the mass matrix is s",),
+    )
+    said = "the areas are those times s, if the factor of the mass matrix is s"
+
+    def examine(_: PlanarMesh, compared: Certificate) -> Examined:
+        fits = f"the mass matrix of triangles with these areas is the given one to {compared.backward_error:.1e}"
+        shapeless = (
+            "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
+        )
+        return Examined(Findings((f"{fits} (relative)", shapeless), compared.backward_error, unique="proved"))
+
+    return finish(
+        held.clock,
+        lambda: Placed(mesh, (*matrix.warnings, said)),
+        lambda _: certify_masses(matrix.edges, matrix.entries, matrix.diagonal, triangles, areas),
+        examine,
     )
 
 
-def with_consistent_mass(held: Held, topology: Topology, plain: Plain, clock: Clock) -> PlanarMesh | None:
+def with_consistent_mass(held: RowSums, topology: Topology, plain: Plain, clock: Clock) -> PlanarMesh | None:
     """The mesh of c L + s M, or areas of s M; None where no areas come near the entries."""
     matrix, union = held.matrix, Together(topology.pieces)
     triangles, opposite = union.vertices[union.triangles], union.edge_rows[union.opposite]
@@ -192,7 +201,7 @@ def with_consistent_mass(held: Held, topology: Topology, plain: Plain, clock: Cl
     return settled(held, weights, {TRIANGLE: triangles}, lambda left: plain(left, squared_lengths), 0, told=False)
 
 
-def with_lumped_mass(held: Held, found: PlanarMesh) -> PlanarMesh:
+def with_lumped_mass(held: RowSums, found: PlanarMesh) -> PlanarMesh:
     """A mesh of c L + D; if D is proportional to the areas about its vertices that is a lumped mass matrix."""
     if not found.certified:
         return found

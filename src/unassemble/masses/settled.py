@@ -20,12 +20,12 @@ from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
 from .cells import Blocks, Weights, less, told_by_entries, weights_at
-from .held import Held
+from .held import RowSums
 
 
 def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, Cells, Weights] | None:
     """Of c L + s M first c L, its cells and their weights; None where no sums, or no cells, tell the mass."""
-    sign = Held(matrix).sign
+    sign = RowSums(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None
     weights = cells and told_by_entries(matrix, cells.blocks)
     if not cells or not weights or not all((sign * some > 0).all() for some in weights.values()):
@@ -34,7 +34,12 @@ def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, Cells, Weights] |
 
 
 def settled(
-    held: Held, start: Weights, blocks: Blocks, plain: Callable[[OperatorMatrix], PlanarMesh], patience: int, told: bool
+    held: RowSums,
+    start: Weights,
+    blocks: Blocks,
+    plain: Callable[[OperatorMatrix], PlanarMesh],
+    patience: int,
+    told: bool,
 ) -> PlanarMesh | None:
     """The mesh whose mass matrix, taken off, leaves its Laplacian; the nearest where there is none.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..recovery import PlanarMesh, Surface
 from ..tolerances import CERTIFIED
-from ..words import sentences
+from ..words import Reason
 
 
 def could_be_planar(surface: Surface) -> bool:
@@ -63,9 +63,7 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
         surface,
         points=planar.points,
         triangles=np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles),
-        status=planar.status,
-        uniqueness=planar.uniqueness,
-        reason=sentences(("the surface is flat", planar.reason)),
+        verdict=planar.verdict.explained("the surface is flat", *planar.verdict.reasons),
         backward_error=max(planar.backward_error, surface.backward_error),
         warnings=planar.warnings,
         realisation={"misfit": 0.0, "largest": 0.0, "misfits": []},
@@ -79,6 +77,8 @@ def unless_planar(surface: Surface) -> Surface:
     """
     if surface.fits_no_plane:
         return surface
-    reason = "the lengths give every entry back, but so may a coefficient that varies in the plane"
-    advice = "say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient"
-    return replace(surface, status="uncertified", uniqueness=None, reason=reason, advice=advice)
+    varies = Reason(
+        "the lengths give every entry back, but so may a coefficient that varies in the plane",
+        advice="say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient",
+    )
+    return replace(surface, verdict=surface.verdict.despite(varies))

@@ -9,20 +9,20 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certificate import certify_metric
+from ..certificate import Certificate, MetricCertificate, certify_metric
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..recovery import Surface
+from ..recovery import Examined, Placed, Surface, finish
 from ..topology.cycles import three_cycles
 from ..topology.keys import pair_keys
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
 from ..topology.numbering import connected
-from ..words import count_of
+from ..words import Reason, count_of
 from .mesh import SurfaceMesh
 from .program import Metric, solve_metric
-from .verdict import READINGS, Found, Verdict, judged, length_deviations, row_sum_test
+from .verdict import READINGS, Found, findings, length_deviations, row_sum_test
 
 
 def recover_surface(
@@ -77,7 +77,7 @@ def _recovered(
     best = (fitting or found)[0]
     if not np.isfinite(best.scale).any():
         raise GeometryError(best.failures[0])
-    verdict = judged(best, len(fitting), len(readings), solid, options, len(cycles.triangles))
+    found_out = findings(best, len(fitting), len(readings), solid, options, len(cycles.triangles))
     deviations = None
     if options.noise is not None and options.standard_deviations:
         with clock("deviations"):
@@ -88,13 +88,30 @@ def _recovered(
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
-        if verdict[0] == "certified" and options.scale is None:
-            reason = (
+        if options.scale is None and found_out.another is None:
+            several = Reason(
                 "with one vertex put back into each hole where rows lack entries, lengths give all entries and row "
                 "sums back, but so may several vertices in a hole"
             )
-            verdict = "ambiguous", "ambiguous", reason
-    return _report(best, verdict, notes, clock, deviations)
+            found_out = replace(found_out, another=several)
+
+    def compare(surface: Surface) -> Certificate:
+        """Of the surface as it is written; with vertices that were put back of that which has them."""
+        return best.certificate.entries if back else _compared(matrix, surface).entries
+
+    return finish(
+        clock,
+        lambda: Placed(_drawn(best, deviations), notes),
+        compare,
+        lambda _, held: Examined(replace(found_out, error=held.backward_error)),
+    )
+
+
+def _compared(matrix: OperatorMatrix, surface: Surface) -> MetricCertificate:
+    """A surface against the matrix."""
+    factor = surface.scale[surface.component[surface.triangles].max(axis=1)]  # hinges have the lowest
+    lengths = surface.edge_lengths
+    return certify_metric(surface.edges, matrix.entries, matrix.diagonal, lengths, surface.triangles, factor)
 
 
 def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: ScalarOptions) -> Found:
@@ -124,9 +141,9 @@ def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: Sc
     return Found(mesh, squared, factor, certificate, tuple(failures), sums)
 
 
-def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, deviations: NDArray | None) -> Surface:
-    mesh, (status, uniqueness, reason) = found.mesh, verdict
-    worst, misfits = found.certificate.entries.worst(10 if uniqueness is None else 0)
+def _drawn(found: Found, deviations: NDArray | None) -> Surface:
+    """The surface, not judged yet."""
+    mesh = found.mesh
     curvature = mesh.curvature(found.squared)
     loop = mesh.loop_of_boundary
     return Surface(
@@ -138,15 +155,7 @@ def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, devi
         boundary=mesh.edges[mesh.boundary[np.argsort(loop, kind="stable")]],
         boundary_offsets=np.append(0, np.cumsum(np.bincount(loop))),
         node_status=(~np.isfinite(curvature)).astype(np.int8),
-        status=status,
-        uniqueness=uniqueness,
-        reason=reason,
         operator="surface laplacian",
-        backward_error=found.certificate.entries.backward_error,
-        timings=clock.timings,
-        warnings=tuple(notes),
-        worst_entries=worst,
-        worst_misfits=misfits,
         edges=mesh.edges,
         edge_lengths=np.sqrt(found.squared),
         curvature=curvature,

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ..certificate import MetricCertificate, chi_square_verdict
+from ..certificate import Findings, MetricCertificate, chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles
-from ..words import sentences, words_of
+from ..words import Reason, words_of
 from .heron import areas_cotangents, blocks_of, summed
 from .mesh import SurfaceMesh
 from .program import Normal
 
 READINGS = 16  # as many choices of triangles as are tried one by one
-
-Verdict = tuple[str, str | None, str]  # status, uniqueness and reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,64 +53,82 @@ class Found:
         return replace(self, mesh=left, squared=(length / mean[piece]) ** 2)
 
 
-def judged(found: Found, fitting: int, readings: int, solid: NDArray, options: ScalarOptions, n_cycles: int) -> Verdict:
+def findings(
+    found: Found, fitting: int, readings: int, solid: NDArray, options: ScalarOptions, n_cycles: int
+) -> Findings:
     """Certified is a surface whose matrix is the given one, diagonal or known scale included, and the only one.
 
     There are as many edges as unknown lengths and scale: nearly every matrix with such a graph belongs to some surface.
     That this one is a Laplacian has to show elsewhere: in rows that sum to zero, or as a multiple of the identity or of
     a lumped mass matrix makes them; or in a scale that was given. Rows next to others that were taken out do not.
     """
-    held = found.certificate
-    if found.failures:
-        return "uncertified", None, found.failures[0]
-    if len(held.entries.flipped):
-        triangle = found.mesh.triangles[held.entries.flipped[0]]
-        return "uncertified", None, f"the sides of the triangle of rows {words_of(triangle)} do not meet"
-    if not found.fits:
-        i, j = held.entries.pairs[np.argmax(held.entries.misfits)]
-        known = "" if options.scale is None else f" with c = {options.scale:g}"
-        error = held.entries.backward_error
-        reason = f"lengths{known} give the entries back up to {error:.1e} (relative) only, worst in rows {i} and {j}"
-        return "uncertified", None, reason
+    fits = "the lengths give every entry back, and no others do on these triangles"
+    about = Findings(
+        fits=(fits,),
+        error=found.certificate.entries.backward_error,
+        unique="proved" if n_cycles == len(found.mesh.triangles) else "searched",
+    )
+    against = tuple(_misfits(found, options))
+    if against:
+        return replace(about, objections=against)
     bare = np.bincount(found.mesh.piece_of_edge, ~solid) == 0
     if bare.any():
         row = int(found.mesh.triangles[found.mesh.piece == np.argmax(bare)].min())
         reason = f"in the piece of row {row} every edge belongs to four rows that are all coupled, as in a solid"
-        return "ambiguous", "ambiguous", f"{reason}: tetrahedra fit as well"
+        return replace(about, another=Reason(f"{reason}: tetrahedra fit as well"))
     if fitting > 1 or readings > READINGS:
-        return "ambiguous", "ambiguous", "other choices of triangles have lengths that fit as well"
-    kept = "proved" if n_cycles == len(found.mesh.triangles) else "searched"
-    fits = "the lengths give every entry back, and no others do on these triangles"
+        return replace(about, another=Reason("other choices of triangles have lengths that fit as well"))
+    shown, against = _laplacian(found, fits, options)
+    return replace(about, fits=(fits, shown), objections=against)
+
+
+def _misfits(found: Found, options: ScalarOptions) -> Iterator[Reason]:
+    """Why lengths do not give the entries back."""
+    held = found.certificate.entries
+    if found.failures:
+        yield Reason(found.failures[0])
+    elif len(held.flipped):
+        triangle = found.mesh.triangles[held.flipped[0]]
+        yield Reason(f"the sides of the triangle of rows {words_of(triangle)} do not meet")
+    elif not found.fits:
+        i, j = held.pairs[np.argmax(held.misfits)]
+        known = "" if options.scale is None else f" with c = {options.scale:g}"
+        much = f"up to {held.backward_error:.1e} (relative) only, worst in rows {i} and {j}"
+        yield Reason(f"lengths{known} give the entries back {much}")
+
+
+def _laplacian(found: Found, fits: str, options: ScalarOptions) -> tuple[str, tuple[Reason, ...]]:
+    """What shows that this is a Laplacian; and what speaks against it, where nothing does."""
     if options.noise is not None:
-        return _with_noise(found, kept, fits, options.noise, options.scale)
+        return _with_noise(found, options.noise, options.scale)
     if options.scale is not None:
-        return "certified", kept, sentences((fits, "the scale is the given one"))
-    off = held.row_misfits > CERTIFIED
+        return "the scale is the given one", ()
+    off = found.certificate.row_misfits > CERTIFIED
     inside = np.bincount(found.mesh.edges[found.mesh.boundary].ravel(), minlength=found.mesh.n) == 0
-    if not off.any() and (held.diagonal == "zero" or inside.any()):
-        return "certified", kept, sentences((fits, _SUMS[held.diagonal]))
+    if not off.any() and (found.certificate.diagonal == "zero" or inside.any()):
+        return _SUMS[found.certificate.diagonal], ()
     row = int(np.argmax(off))
     reason = (
         f"{fits}, but there are as many unknowns as entries, and that this is a surface with all its rows does not "
         f"show: rows do not sum to zero, row {row} for one"
     )
-    return "uncertified", kept, sentences((reason, "a known scale would tell"))
+    return "", (Reason(reason, "a known scale would tell"),)
 
 
-def _with_noise(found: Found, kept: str, fits: str, sigma: float, scale: float | None) -> Verdict:
+def _with_noise(found: Found, sigma: float, scale: float | None) -> tuple[str, tuple[Reason, ...]]:
     """Lengths fit noisy entries as well as exact ones: what is tested is the row sums, or the scale."""
     if sigma > LARGEST_NOISE * np.abs(found.scale).min():
-        return "uncertified", None, "the noise is too large: angles are known to no more than a few degrees"
+        return "", (Reason("the noise is too large: angles are known to no more than a few degrees"),)
     if scale is not None:
         error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
         off = float((np.abs(found.scale - scale) / error).max())
         if 2 * ndtr(-off) >= CONFIDENCE:
-            return "certified", kept, sentences((fits, "the scale is the given one up to noise"))
-        return "uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations"
+            return "the scale is the given one up to noise", ()
+        return "", (Reason(f"the entries tell another scale, off by {off:.1f} standard deviations"),)
     test = found.sums or {}
     if min(test["p_value"], test["largest_p_value"]) >= CONFIDENCE:
-        return "certified", kept, sentences((fits, "rows sum to zero up to noise"))
-    return "uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare"
+        return "rows sum to zero up to noise", ()
+    return "", (Reason("rows do not sum to zero, by more than noise, and no entries are to spare"),)
 
 
 _SUMS = {

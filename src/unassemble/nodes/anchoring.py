@@ -1,7 +1,7 @@
 """What is asked for beside the matrix; known positions: one fixes the translation of its piece, two size and sign."""
 
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,28 +53,60 @@ class Request:
         return np.asarray(nodes), np.asarray(places, dtype=np.float64).reshape(-1, d)
 
 
+@dataclass(frozen=True, eq=False)
+class Anchored:
+    """Pieces moved to their anchors."""
+
+    points: NDArray[np.float64]  # (n, d) as they are to be written
+    #: (pieces,) by which each was enlarged; negative where it was reflected in a point, NaN where the size is free
+    factor: NDArray[np.float64]
+    notes: tuple[str, ...]  # what was not used, what does not fit, and what is free
+    lost: float  # the digits that coordinates lost far from the origin, in mean lengths of edges
+
+    def objections(self, before: str) -> Iterator[Reason]:
+        """That coordinates lost more digits than entries would bear; `before`: what holds without that."""
+        if self.lost > SUMMED:
+            yield Reason(
+                f"the anchors lie so far from the origin that coordinates, as written, are off by {self.lost:.1e} edge "
+                "lengths: they have too few digits left",
+                f"before, {before}",
+                advice="subtract a point near the anchors from all of `anchors`",
+            )
+
+
 def anchored(
     request: Request,
     rows: Rows,
     points: NDArray[np.float64],
     component: NDArray[np.int64],
-    evidence: tuple[Evidence, ...],
-    verdict: tuple[str, Reason],
     edge: float,
     *,
     sized: bool = False,
-    notes: Iterable[str],
     free: str,
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
-    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With what results share.
+) -> Anchored:
+    """Translate each piece to its anchors and, unless `sized`, rescale it; axes stay.
 
-    The factor, one for each piece, is that by which it was enlarged; negative where it was reflected in a point, NaN
-    where the size is by convention, and what is `free` is said. What was certified is not if its coordinates, of that
-    mean `edge`, lost more digits than entries would bear, as they do far from the origin.
+    Parameters
+    ----------
+    request : Request
+        Has the anchors.
+    rows : Rows
+        Which node each row belongs to.
+    points : (n, d) float64
+        Positions of the nodes, NaN where they are not determined.
+    component : (n,) int64
+        The piece of each node, -1 for those of none.
+    edge : float
+        The mean length of edges, in which lost digits are measured.
+    sized : bool
+        Whether the matrix tells size and sign.
+    free : str
+        What is said where anchors leave them free.
     """
     nodes, places = request.held(rows.node_of_row, points.shape[1])
-    points, factor, lost = points.copy(), np.full(len(evidence), 1.0 if sized else np.nan), 0.0
-    notes = [*request.matrix.warnings, *notes]
+    count = int(component.max(initial=-1)) + 1
+    points, factor, lost = points.copy(), np.full(count, 1.0 if sized else np.nan), 0.0
+    notes = []
     adrift = nodes[component[nodes] < 0]
     if len(adrift):
         notes.append(f"the anchored nodes {', '.join(map(str, adrift))} are not determined and were not used")
@@ -95,26 +127,18 @@ def anchored(
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
     if np.isnan(factor).any():
         notes.append(free)
-    status, reason = verdict
-    if status == "certified" and lost > SUMMED:
-        status = "uncertified"
-        reason = Reason.of(
-            f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge lengths: "
-            "they have too few digits left",
-            f"before, {reason.text}",
-            advice="subtract a point near the anchors from all of `anchors`",
-        )
-    return factor, {
+    return Anchored(points, factor, tuple(notes), lost)
+
+
+def mechanical_fields(
+    request: Request, rows: Rows, points: NDArray, component: NDArray[np.int64], evidence: tuple[Evidence, ...]
+) -> dict[str, Any]:
+    """Fields that all bodies and structures have, by name."""
+    return {
         "points": points,
         "component": component,
         "node_status": (component < 0).astype(np.int8),
         "evidence": evidence,
-        "status": status,
-        "uniqueness": "searched" if status == "certified" else None,
-        "reason": reason.text,
-        "advice": reason.advice,
-        "timings": request.clock.timings,
-        "warnings": tuple(notes),
         "node_of_row": rows.node_of_row,
         "direction_of_row": rows.direction_of_row,
         "numbering": rows.kind,

@@ -135,14 +135,13 @@ class Known:
     error: float  # largest of a node, relative to the diameter of its piece; infinite where one may get lost
     explained: bool = True  # whether rounding explains the misfits, so that the error is all that there is
 
-    def objection(self, misfit: float, rounding: Rounding | None, said: str) -> Reason | None:
-        """Why positions are not certified that leave some largest misfit, which is `said`; None where they are."""
+    def objections(self, misfit: float, rounding: Rounding | None, said: str) -> Iterator[Reason]:
+        """Why positions are not certified that leave some largest misfit, which is `said`."""
         allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
         if not (misfit <= allowed and self.explained):
-            return Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
-        return (
-            Reason(f"{said}, and positions may be off by {self.error:.0e} of the size") if self.error > needed else None
-        )
+            yield Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
+        if self.error > needed:
+            yield Reason(f"{said}, and positions may be off by {self.error:.0e} of the size")
 
     def within(self, rounding: Rounding | None) -> str:
         """How far positions are known, in words; empty for entries of full precision."""

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..certificate import UNJUDGED, Status, Uniqueness, Verdict
+from ..words import sentences
+
 if TYPE_CHECKING:
     import meshio
     from matplotlib.figure import Figure
@@ -42,14 +45,8 @@ class Recovery:
     boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible, a position that entries do not determine.
     node_status: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, np.int8))
-    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, and no other mesh
-    #: is known that does.
-    status: str = "uncertified"
-    #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
-    #: one; None where this one does not fit.
-    uniqueness: str | None = None
-    reason: str = ""  #: Why, in one sentence or two.
-    advice: str = ""  #: What to do next, where the mesh is not certified.
+    #: What the mesh is worth, and why; `status`, `uniqueness`, `reason` and `advice` say so one by one.
+    verdict: Verdict = UNJUDGED
     #: ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``;
     #: ``"frame or shell"``, ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``;
     #: ``"structure"`` where they have displacements only and elements are of any kind; ``"surface laplacian"``.
@@ -82,6 +79,30 @@ class Recovery:
     plot: ClassVar[Callable[..., Figure]]
     _repr_html_: ClassVar[Callable[[Recovery], str]]
     rigid_body_modes: ClassVar[Callable[[Recovery], NDArray[np.float64]]]
+
+    @property
+    def status(self) -> Status:
+        """``"certified"``, ``"ambiguous"`` or ``"uncertified"``, see :mod:`unassemble.certificate`."""
+        return self.verdict.status
+
+    @property
+    def uniqueness(self) -> Uniqueness | None:
+        """Of other meshes that fit: ``"proved"``, there is none; ``"searched"``, a search found none.
+
+        ``"conventional"``: there is no other grid or lattice, but meshes that are neither may fit. ``"ambiguous"``:
+        there is another. None where this mesh does not fit.
+        """
+        return self.verdict.uniqueness
+
+    @property
+    def reason(self) -> str:
+        """Why the mesh has its status, in one sentence or two."""
+        return sentences(self.verdict.reasons)
+
+    @property
+    def advice(self) -> str:
+        """What to do next, where the mesh is not certified."""
+        return self.verdict.advice
 
     @property
     def certified(self) -> bool:

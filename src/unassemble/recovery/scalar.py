@@ -55,6 +55,16 @@ class PlanarMesh(Recovery):
         return len(self.polygons_offsets) - 1
 
     @property
+    def cells_to_assemble(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind as elements have them: polygons are divided, in any way."""
+        return {"triangle": self.divided()[0]}
+
+    @property
+    def rules(self) -> dict[str, str]:
+        """The quadrature that integrates each kind of `cells_to_assemble`."""
+        return {"triangle": "degree 1"}
+
+    @property
     def largest_deviation(self) -> float | None:
         """The largest error bar of a coordinate, where there are any."""
         deviations = self.standard_deviations
@@ -92,6 +102,17 @@ class ConformingMesh(PlanarMesh):
     def cells(self) -> dict[str, NDArray[np.int64]]:
         """Cells of each kind that occurs, all their nodes, by meshio's names."""
         return with_mid_nodes(occurring(triangle=self.triangles, quad=self.quads), self.mid_nodes)
+
+    @property
+    def cells_to_assemble(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind, which are elements as they are."""
+        return self.cells
+
+    @property
+    def rules(self) -> dict[str, str]:
+        """The quadrature that integrates each kind, as far as `quadrature` tells."""
+        names = self.quadrature.split(", ")
+        return {kind: next(one for one in names if ("Gauss" in one) == kind.startswith("quad")) for kind in self.cells}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

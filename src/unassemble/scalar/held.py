@@ -9,32 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certificate import Certificate, Terms, certify, chi_square_verdict
-from ..matrix import OperatorMatrix
-from ..recovery import ConformingMesh, PlanarMesh
+from ..certificate import Certificate, chi_square_verdict
 from ..tolerances import CERTIFIED, CHANCE, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
 from .noise import Noise
 from .solving import Solved
 
 
-def held(
-    matrix: OperatorMatrix,
-    mesh: PlanarMesh,
-    tensor: tuple[float, float, float] | None = None,
-    terms: Terms | None = None,
-) -> Certificate:
-    """A mesh against a matrix, its entries only or, with further terms, all of it; `tensor`: (kxx, kxy, kyy)."""
-    cells, rules = {"triangle": mesh.divided()[0]}, {"triangle": "degree 1"}
-    if isinstance(mesh, ConformingMesh):
-        cells, names = mesh.cells, mesh.quadrature.split(", ")
-        rules = {kind: next(one for one in names if ("Gauss" in one) == kind.startswith("quad")) for kind in cells}
-    factors = {kind: mesh.scale[mesh.component[own].max(axis=1)] for kind, own in cells.items()}  # hinges: the lowest
-    given = matrix.edges, matrix.entries, mesh.points
-    return certify(*given, cells, factors, rules=rules, tensor=tensor, terms=terms)
-
-
 @dataclass(frozen=True, eq=False)
-class Held:
+class PlanarComparison:
     """A certificate, and where noise is known the test of its misfit."""
 
     certificate: Certificate
@@ -64,13 +46,18 @@ class Held:
         figures = [self.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value")]
         return "(chi-square {:.4g} with {:.4g} degrees of freedom, p = {:.3g})".format(*figures)
 
-    def fields(self, count: int, first: NDArray | None = None) -> dict[str, Any]:
-        """What every result says of it, with the worst `count` entries, those of `first` (k, 2) before others."""
-        worst, misfits = self.certificate.worst(count, noise=self.errors, first=first)
+    @property
+    def backward_error(self) -> float:
+        """The largest misfit, relative to the largest off-diagonal entry of its row."""
+        return self.certificate.backward_error
+
+    def worst(self, count: int, first: NDArray | None = None) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The entries that fit worst, and their misfits; those of `first`, (k, 2), before others."""
+        return self.certificate.worst(count, noise=self.errors, first=first)
+
+    def fields(self) -> dict[str, Any]:
+        """What every planar mesh says of it."""
         return {
-            "backward_error": self.certificate.backward_error,
-            "worst_entries": worst,
-            "worst_misfits": misfits,
             "chi_square": self.figures or None,
             "n_entries": len(self.certificate.misfits),
             "n_fitting": int(np.count_nonzero(self.certificate.misfits <= CERTIFIED)),

@@ -18,7 +18,7 @@ from .noise import Noise
 from .solving import Solved, leaders
 
 if TYPE_CHECKING:
-    from .verdict import Findings
+    from .findings import Finished
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
 _ONE_COEFFICIENT = "see whether a coefficient varies from cell to cell, the surface is curved or it is a network"
@@ -27,13 +27,16 @@ _LEAVE_SCALE = "leave out `scale`: it is found where it is not given"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
 
-def objections(f: Findings) -> Iterator[tuple[str, str]]:
+def objections(f: Finished) -> Iterator[Reason]:
     """All that speaks against a mesh, the gravest first, each with what to do about it; nothing where it is right."""
     apart = _discord(f.solved, f.certificate.backward_error)
-    yield from _doubts(f, apart) if f.near.passes else _misfits(f, apart)
+    for said, advice in _doubts(f, apart) if f.near.passes else _misfits(f, apart):
+        yield Reason(said, advice=advice)
+    if f.near.passes and not f.compared.written.passes:
+        yield far_away(f.origins, f.compared.written.certificate, f.certificate)
 
 
-def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
+def _doubts(f: Finished, apart: str) -> Iterator[tuple[str, str]]:
     """What leaves a mesh in doubt although it fits."""
     topology, error, allowed = f.solved.topology, f.certificate.backward_error, PLACED
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
@@ -63,7 +66,7 @@ def _doubts(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
         )
 
 
-def _without_spare(f: Findings) -> NDArray[np.int64]:
+def _without_spare(f: Finished) -> NDArray[np.int64]:
     """A row of each piece that has no equations to spare."""
     solved, known = f.solved, not f.solved.task.free_scale
     if solved.linear:
@@ -71,7 +74,7 @@ def _without_spare(f: Findings) -> NDArray[np.int64]:
     return np.array([piece.vertices.min() for piece in solved.topology.pieces])[solved.spare + known <= 0]
 
 
-def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
+def _misfits(f: Finished, apart: str) -> Iterator[tuple[str, str]]:
     """What does not fit, and what it looks like."""
     topology, stored, certificate, noise = f.solved.topology, f.solved.stored, f.certificate, f.near.by_noise
     if noise and f.near.drowned:
@@ -127,7 +130,7 @@ def _misfits(f: Findings, apart: str) -> Iterator[tuple[str, str]]:
     yield f"the re-assembled matrix differs most in the entry of rows {i} and {j}, {most}", model
 
 
-def _lacking(f: Findings, term: Term) -> Iterator[tuple[str, str]]:
+def _lacking(f: Finished, term: Term) -> Iterator[tuple[str, str]]:
     """That a term explains a misfit which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     which, advice = "most entries are off in one direction", _CHECK_MODEL
@@ -142,7 +145,7 @@ def _lacking(f: Findings, term: Term) -> Iterator[tuple[str, str]]:
     yield which, ""
 
 
-def _like_noise(f: Findings) -> str:
+def _like_noise(f: Finished) -> str:
     """That the misfit is small and nowhere concentrated; empty where it is not."""
     size, noise = np.abs(f.certificate.differences), f.evidence.noise
     if not (noise and noise <= LARGEST_NOISE * np.abs(f.solved.scales).min()):
@@ -151,7 +154,7 @@ def _like_noise(f: Findings) -> str:
     return f"noise of standard deviation {noise:.2g} (absolute) in the entries would leave as much" if small else ""
 
 
-def _astray(f: Findings) -> str:
+def _astray(f: Finished) -> str:
     """On a mesh that is not the one of known noise: where the polish has ended."""
     if len(f.evidence.suspects):
         return ""
@@ -161,7 +164,7 @@ def _astray(f: Findings) -> str:
     return f"the polish has not come to a mesh that explains the matrix, and {why}"
 
 
-def _unlikely(f: Findings, noise: Noise) -> str:
+def _unlikely(f: Finished, noise: Noise) -> str:
     """That noise would not leave such a misfit."""
     figures = f.near.figures
     if figures["p_value"] < CONFIDENCE:
@@ -177,7 +180,7 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
     """The reason of a mesh that fits, where others do as well."""
     first = others[0]
     instead = f" in place of {_cells(first.cells)}" if first.cells else " besides"
-    return Reason.of(
+    return Reason(
         f"the mesh gives the matrix back to {certificate.backward_error:.1e} (relative), but so does another, with "
         f"the cells {_cells(first.other_cells)}{instead}",
         f"likewise in {count_of(len(others) - 1, 'more part')} of the matrix" if len(others) > 1 else "",
@@ -222,7 +225,7 @@ def _discord(solved: Solved, backward_error: float) -> str:
 def far_away(origins: NDArray, written: Certificate, near: Certificate) -> Reason:
     """The reason of a mesh that fits until its coordinates are written, too far from the origin."""
     origin = complex(origins[np.abs(origins).argmax()])
-    return Reason.of(
+    return Reason(
         f"the mesh gives the matrix back to {near.backward_error:.1e} (relative), but its coordinates lie so far from "
         f"the origin that they have too few digits left: as written they give it back to "
         f"{written.backward_error:.1e} (relative)",

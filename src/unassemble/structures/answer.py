@@ -1,6 +1,6 @@
 """A structure held against its matrix and given back: the verdict, fields and sentences that all kinds share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,17 +8,18 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..nodes.anchoring import Request, anchored
+from ..certificate import Findings
+from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.numbering import Rows
 from ..nodes.rounded import Known, Rounding, known_to
-from ..recovery import Structure
-from ..tolerances import ROUNDED
+from ..recovery import Examined, Placed as Finished, Residual, Structure, finish
+from ..tolerances import CERTIFIED, ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .placed import Placed
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldStructure:
     """Positions held against the matrix."""
 
     error: float  # the largest misfit
@@ -36,21 +37,21 @@ class Held:
             return Known(float(self.error * np.sqrt(loosest.rows) / loosest.gap))
         return known_to(found.points, found.component, self.misfits, self.rounding, self.again, sized=sized)
 
-    def verdict(self, found: Placed, known: Known) -> tuple[str, Reason]:
-        """Status and reason."""
-        holds, left = self.said
-        objection = known.objection(self.error, self.rounding, left)
-        if objection is None and found.unnoticed.any():
+    def objections(self, found: Placed, known: Known) -> Iterator[Reason]:
+        """What speaks against the positions."""
+        yield from known.objections(self.error, self.rounding, self.said[1])
+        if found.unnoticed.any():
             count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
             unseen = (
                 f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
             )
-            objection = Reason(unseen, WITHOUT_SUPPORTS)
-        if objection is not None:
-            return "uncertified", objection
+            yield Reason(unseen, advice=WITHOUT_SUPPORTS)
+
+    def fits(self, known: Known) -> str:
+        """What holds, how far it determines positions, and which rows say so."""
         digits = known.within(self.rounding)
         share = f"{self.rows.mean():.0%} of the rows say so, of {self.unknowns.mean():.0%} of the unknowns"
-        return "certified", Reason(f"{holds}{digits}: {share}")
+        return f"{self.said[0]}{digits}: {share}"
 
 
 def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
@@ -63,7 +64,7 @@ def answer(
     request: Request,
     rows: Rows,
     found: Placed,
-    held: Held,
+    held: HeldStructure,
     *,
     edges: NDArray[np.int64],
     sized: bool,
@@ -79,16 +80,28 @@ def answer(
     """
     with request.clock("certify"):
         known = held.known(found, sized=sized)
-        verdict = held.verdict(found, known)
-        doubts = doubt() if verdict[0] == "certified" else None
+        objections = list(held.objections(found, known))
+        if not objections and (doubts := doubt()) is not None:
+            objections.append(doubts)
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
     if 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
-        doubts = Reason("most nodes that are coupled are in one place", GIVE_NUMBERING)
-    if verdict[0] == "certified" and doubts is not None:
-        verdict = "uncertified", doubts
+        objections.append(Reason("most nodes that are coupled are in one place", advice=GIVE_NUMBERING))
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
-    said, placed = (*found.notes, *notes), (found.points, found.component, found.evidence)
-    factor, shared = anchored(request, rows, *placed, verdict, edge, sized=sized, notes=said, free=free)
-    off = known.error if held.rounding and known.explained else None
-    scale = np.full(len(factor), np.nan)
-    return Structure(scale=scale, backward_error=held.error, position_error=off, **shared, **fields)
+    fits = held.fits(known)
+
+    def place() -> Finished[Structure]:
+        moved = anchored(request, rows, found.points, found.component, edge, sized=sized, free=free)
+        objections.extend(moved.objections(fits))
+        structure = Structure(
+            scale=np.full(len(moved.factor), np.nan),
+            position_error=known.error if held.rounding and known.explained else None,
+            **mechanical_fields(request, rows, moved.points, found.component, found.evidence),
+            **fields,
+        )
+        return Finished(structure, (*request.matrix.warnings, *found.notes, *notes, *moved.notes))
+
+    def examine(_: Structure, compared: Residual) -> Examined:
+        allowed = np.inf if held.rounding else CERTIFIED
+        return Examined(Findings((fits,), compared.backward_error, tuple(objections), allowed=allowed))
+
+    return finish(request.clock, place, lambda _: Residual(held.error), examine)

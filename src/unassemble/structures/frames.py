@@ -13,7 +13,7 @@ from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason, count_of
-from .answer import Held, about_loose, answer
+from .answer import HeldStructure, about_loose, answer
 from .certificate import forces, members_misfits, mispaired
 from .contradicted import said_of
 from .members import members_and_cells
@@ -49,7 +49,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
             return None
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
         unlike = f"those of rows {first} and {second}, as numbered, do not couple like the rows of two nodes"
-        return Reason(f"which rows belong to one node is not certain: {unlike}", GIVE_NUMBERING)
+        return Reason(f"which rows belong to one node is not certain: {unlike}", advice=GIVE_NUMBERING)
 
     straight = found.points
     force, used = forces(whole, numbering, nodes, straight, valid)
@@ -61,7 +61,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     blocks = f", {count_of(len(ends), 'block is that', 'blocks are those')} of straight members" if len(ends) else ""
     left = f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
     said = f"rigid rotations of the nodes cause no forces{blocks}", left
-    held = Held(error, force, again, rounding, said, used, abs(whole[used]).sum(axis=0) > 0)
+    held = HeldStructure(error, force, again, rounding, said, used, abs(whole[used]).sum(axis=0) > 0)
     notes = [said_of(found.spoiled)] if len(found.spoiled) else []
     found = replace(found, points=np.pad(found.points, ((0, 0), (0, layout.space - layout.dim))))
     fields: dict[str, Any] = {}

@@ -22,7 +22,7 @@ from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
 from ..recovery import Evidence, Structure
 from ..tolerances import CANCELLED, CERTIFIED, SMALL
-from .answer import Held, about_loose, answer
+from .answer import HeldStructure, about_loose, answer
 from .least_squares import up_to_size
 from .placed import Piece, Placed, placed, without_free
 
@@ -116,7 +116,7 @@ def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: R
         f"blocks are off those of bars by {error:.1e} of a row's largest",
     )
     lines = bars.ends[~loose[bars.ends].any(axis=1)]
-    held = Held(error, misfits, again, rounding, said, rows, rows)
+    held = HeldStructure(error, misfits, again, rounding, said, rows, rows)
     free = "the sign of the scale is free: the point reflection of a truss has the same matrix"
     notes = about_loose(loose, "the directions of all bars leave them room")
     return answer(
