@@ -80,7 +80,7 @@ def recover_lattice(
         mesh,
         node_status=status,
         status="ambiguous" if lattice.like_mass else "certified",
-        uniqueness="ambiguous",
+        uniqueness="ambiguous" if lattice.like_mass else "conventional",
         reason=(
             f"the grid, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
             f"the matrix back to {error:.1e} (relative), row sums included"

@@ -15,7 +15,7 @@ from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, CERTIFIED
-from ..words import Reason
+from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
@@ -108,11 +108,10 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     factor, shared = anchored(
         request, rows, placed, component, solution.evidence, (status, reason), 1.0, notes=said, free=free
     )
-    if len(nodal.indices) == nodal.n**2 and numbering.kind != "given":
+    if shared["status"] == "certified" and len(nodal.indices) == nodal.n**2 and not request.named:
         # Of a rectangle, say, rows along y with those of opposite corners: those of its mirror image.
         other = "all nodes are coupled, as those of one element: which rows are of one node may be another choice"
-        shared["warnings"] += (other,)
-        shared["uniqueness"] = shared["uniqueness"] and "ambiguous"
+        shared |= {"status": "ambiguous", "uniqueness": "ambiguous", "reason": other, "advice": GIVE_NUMBERING}
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     return Body(
         **fields_of(shown.blocks),

@@ -42,11 +42,12 @@ class Recovery:
     boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible, a position that entries do not determine.
     node_status: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, np.int8))
-    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, and no other mesh
-    #: is known that does.
+    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, with entries to
+    #: spare, and no other mesh is known that does, but for grids (``"conventional"``).
     status: str = "uncertified"
-    #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
-    #: one; None where this one does not fit.
+    #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"conventional"``, no
+    #: other grid of equal cells does, while meshes that are no grids may; ``"ambiguous"``, there is one, as the status
+    #: says, too; None where this one does not fit.
     uniqueness: str | None = None
     reason: str = ""  #: Why, in one sentence or two.
     advice: str = ""  #: What to do next, where the mesh is not certified.
