@@ -7,7 +7,8 @@ so is every answer that takes more than ten seconds of processor time.
 
 What a certificate says is held against the mesh where one is known, each edge-connected piece up to similarity, and
 the operator is assembled again by scikit-fem. Where the matrix is given back by another mesh than its own, the answer
-counts as ambiguous, unless its uniqueness is said to be proved, which is wrong then.
+counts as ambiguous, unless its uniqueness is said to be proved, which is wrong then; so does a grid of equal cells in
+place of another mesh, where its uniqueness is said to be conventional.
 """
 
 from __future__ import annotations
@@ -213,12 +214,12 @@ def judged(given: Given) -> str:
         return "right" if lengths_give_back(found, sp.csr_array(given.matrix, dtype=np.float64)) else "WRONG"
     right = given.pieces is not None and positions_agree(found, given.pieces)
     if not hasattr(found, "divided"):  # bodies and structures
-        return "right" if right else "ambiguous" if found.uniqueness == "ambiguous" else "WRONG"
+        return "right" if right else "WRONG"
     matrix = sp.csr_array(given.matrix)
     if found.areas is not None:
         return "right" if areas_give_back(found, matrix) else "WRONG"
     if len(found.eliminated_points):  # the triangles beyond are not in the answer, so that nothing can be assembled
-        return "right" if right else "ambiguous" if found.uniqueness == "ambiguous" else "WRONG"
+        return "right" if right else "ambiguous" if found.uniqueness == "conventional" else "WRONG"
     if found.row_scaling is not None:
         back = sp.diags_array(1 / found.row_scaling)
         matrix = sp.csr_array(back @ matrix @ back)

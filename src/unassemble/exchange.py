@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import meshio
 
 STATUS = ("certified", "ambiguous", "uncertified")
-UNIQUENESS = ("proved", "searched", "ambiguous", None)
-"""Words that are numbers in point data, by their place."""
+UNIQUENESS = ("proved", "searched", "ambiguous", None, "conventional")
+"""Words that are numbers in point data, by their place, which none of them ever changes."""
 
 
 def to_meshio(recovery: Recovery) -> meshio.Mesh:

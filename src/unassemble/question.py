@@ -167,6 +167,8 @@ class Question:
             with self.clock("numbering"):
                 reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
         try:
-            return recover_vector(self.matrix, reading, self.clock, anchors=self.frame.anchors, cells=self.about.cells)
+            named = self.about.numbering is not None
+            anchors, cells = self.frame.anchors, self.about.cells
+            return recover_vector(self.matrix, reading, self.clock, anchors=anchors, cells=cells, named=named)
         except GeometryError as error:
             raise GeometryError(f"the matrix is {reading.name}, but {error}") from error

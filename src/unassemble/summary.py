@@ -9,7 +9,12 @@ from .tolerances import CERTIFIED, SUSPICIOUS
 from .words import count_of, kind_text
 
 _SHOWN = 3
-_OTHERS = {"proved": "none fits", "searched": "none found that fits", "ambiguous": "another fits as well"}
+_OTHERS = {
+    "proved": "none fits",
+    "searched": "none found that fits",
+    "conventional": "no other grid of equal cells fits",
+    "ambiguous": "another fits as well",
+}
 
 
 def summary(recovery: Recovery) -> str:

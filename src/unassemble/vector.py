@@ -20,14 +20,20 @@ from .tolerances import CANCELLED
 
 
 def recover_vector(
-    matrix: OperatorMatrix, reading: VectorReading, clock: Clock, *, anchors: Sequence[Any] | None, cells: bool
+    matrix: OperatorMatrix,
+    reading: VectorReading,
+    clock: Clock,
+    *,
+    anchors: Sequence[Any] | None,
+    cells: bool,
+    named: bool = False,
 ) -> Recovery:
     """Recover a vector-valued matrix whose numbering is known; see :class:`.nodes.anchoring.Request`.
 
     InputError for anchors that do not fit, RecoveryError if no piece is determined.
     """
     numbering, rounding = reading.numbering, reading.rounding
-    request = Request(matrix, clock, anchors, cells, reading.why, rounding)
+    request = Request(matrix, clock, anchors, cells, reading.why, rounding, named)
     space = numbering.layout.space if isinstance(numbering, StructuralNumbering) else numbering.block_size
     request.held(numbering.node_of_row, space)  # anchors that do not fit, before the long work
     if isinstance(numbering, StructuralNumbering):
@@ -46,7 +52,7 @@ def recover_vector(
         if other is None:
             raise
         return other
-    return body if body.certified else _by_rotations(numbering, request) or body
+    return body if body.status != "uncertified" else _by_rotations(numbering, request) or body
 
 
 def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:

@@ -36,7 +36,7 @@ def test_finite_differences(shape, c):
     assert not len(found.triangles)
     assert found.scale == pytest.approx(c, rel=1e-12)
     assert not found.node_status.any()
-    assert found.uniqueness == "ambiguous"  # others fit too, bent next to what is gone
+    assert found.uniqueness == "conventional"  # others fit too, bent next to what is gone
 
 
 def test_the_vertices_that_are_gone():

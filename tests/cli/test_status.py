@@ -8,6 +8,8 @@ import re
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from skfem import Basis, ElementQuad1, ElementVector, MeshQuad, asm
+from skfem.models.elasticity import linear_elasticity
 
 from meshes import random_mesh, specimen
 from unassemble.errors import (
@@ -30,6 +32,35 @@ def spoilt(matrix: sp.csr_array) -> sp.coo_array:
     i, j = entries.row[k], entries.col[k]
     entries.data[((entries.row == i) & (entries.col == j)) | ((entries.row == j) & (entries.col == i))] *= 1.5
     return entries
+
+
+def five_point_stencil(rows: int, columns: int) -> sp.csr_array:
+    """Of a grid of squares, with the boundary eliminated."""
+    one, other = (sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n)) for n in (rows, columns))
+    return sp.csr_array(sp.kron(one, sp.eye_array(columns)) + sp.kron(sp.eye_array(rows), other))
+
+
+def test_0_of_a_grid_that_is_unique_among_grids(work):
+    work.write("B.mtx", five_point_stencil(5, 6))
+    result = work.recover("--report", "r.json", matrix="B.mtx")
+    assert result.exit_code == 0, result.stderr
+    report = json.loads((work.folder / "r.json").read_text())
+    assert (report["status"], report["uniqueness"]) == ("certified", "conventional")
+    assert "other meshes    no other grid of equal cells fits" in result.stdout
+    assert "may fit as well" in result.stdout
+
+
+def test_3_of_a_single_element(work):
+    """Of a square, plane strain with both Lame coefficients 1: rows along y of opposite corners can change places."""
+    basis = Basis(MeshQuad(), ElementVector(ElementQuad1()))
+    work.write("B.mtx", asm(linear_elasticity(1.0, 1.0), basis))
+    result = work.recover("--report", "r.json", matrix="B.mtx")
+    assert result.exit_code == 3, result.stderr
+    report = json.loads((work.folder / "r.json").read_text())
+    assert (report["status"], report["uniqueness"]) == ("ambiguous", "ambiguous")
+    assert "which rows are of one node may be another choice" in report["reason"]
+    given = work.recover("--numbering", "interleaved", "--block-size", "2", matrix="B.mtx")
+    assert given.exit_code == 0, given.stdout
 
 
 def test_3_written_but_not_certified(work):

@@ -107,7 +107,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     rows = replace(numbering, direction_of_row=np.where(guessed, -1, numbering.direction_of_row))
     free = "the sign of the scale is free: with a mesh its point reflection fits the matrix as well"
     another = None
-    if len(nodal.indices) == nodal.n**2 and numbering.kind != "given":
+    if len(nodal.indices) == nodal.n**2 and not request.named:
         # Of a rectangle, say, rows along y with those of opposite corners: those of its mirror image.
         another = Reason(
             f"{sure}, but all nodes are coupled, as those of one element",

@@ -28,6 +28,7 @@ class Request:
     cells: bool = True  # look for elements too, not only where nothing else confirms positions
     choice: str = ""  # why the matrix was taken for what it is
     rounding: Rounding | None = None  # of the entries, where they have few digits
+    named: bool = False  # whether the caller said in which order the unknowns stand, or gave the numbering
 
     def held(self, node_of_row: NDArray[np.int64], d: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,) and known positions (k, d) of the anchors.
