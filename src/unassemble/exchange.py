@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .elements.surface import outer_nodes
 from .formats import MeshFormat
-from .recovery import PlanarMesh, Recovery, Surface
+from .recovery import PlanarMesh, Recovery
 from .structures.layouts import layout_named
 
 if TYPE_CHECKING:
@@ -52,14 +51,10 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
         rows[direction[told], node[told]] = np.flatnonzero(told)
         layout = layout_named(recovery.operator)
         data = {f"row_{name}": row for name, row in zip("xyz" if layout is None else layout.names, rows, strict=False)}
-    data |= {"component": recovery.component, "boundary": _boundary_flag(recovery)}
+    data |= {"component": recovery.component, "boundary": recovery.boundary_flag()}
     if recovery.node_status.any():
         data["node_status"] = recovery.node_status.astype(np.int64)
-    if isinstance(recovery, PlanarMesh) and recovery.standard_deviations is not None:
-        for name, column in zip("xyz", recovery.standard_deviations.T, strict=False):
-            data[f"standard_deviation_{name}"] = np.ascontiguousarray(column)
-    if isinstance(recovery, Surface):
-        data["curvature"] = recovery.curvature
+    data |= recovery.point_data()
     worth = {
         "status": STATUS.index(recovery.status),
         "uniqueness": UNIQUENESS.index(recovery.uniqueness),
@@ -71,23 +66,13 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
     return data | {"scale": np.append(recovery.scale, np.nan)[recovery.component]}
 
 
-def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
-    flag = np.zeros(recovery.n_points, dtype=np.int64)
-    flag[recovery.boundary] = 1
-    if recovery.dim == 3 and not isinstance(recovery, Surface):
-        solid = dict(recovery.cells)
-        flag[solid.pop("line", [])] = 1
-        flag[outer_nodes(solid) if solid else []] = 1
-    return flag
-
-
 def mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
     import meshio
 
     data = _point_data(recovery) if mesh_format.data == "all" else {}
     if mesh_format.data == "boundary":
-        data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
+        data = {f"{mesh_format.name}:ref": recovery.boundary_flag()}
     points = np.zeros((recovery.n_points, max(mesh_format.dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
     blocks = list(cells_of(recovery).items())

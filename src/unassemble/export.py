@@ -15,7 +15,7 @@ from .errors import FormatError
 from .exchange import cells_of, mesh_for
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
-from .recovery import PlanarMesh, Recovery, Surface
+from .recovery import Recovery
 
 if TYPE_CHECKING:
     import meshio
@@ -52,7 +52,7 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
-    content: dict[str, Any] = {} if without_points(recovery) else {"points": recovery.points}
+    content: dict[str, Any] = {} if recovery.shapeless else {"points": recovery.points}
     for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines", "eliminated_points", "region"):
         found = getattr(recovery, name, None)  # each kind of result has its own
         if found is not None and found.size:
@@ -70,21 +70,13 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     return content | worth
 
 
-def without_points(recovery: Recovery) -> bool:
-    """Whether there are edge lengths only, or areas, which no format but ``.npz`` holds."""
-    if isinstance(recovery, Surface):
-        return not np.isfinite(recovery.points).any()
-    return isinstance(recovery, PlanarMesh) and recovery.areas is not None
-
-
 def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
     if not mesh_format.name:
         return
-    if without_points(recovery):
-        what = "the matrix of a surface tells edge lengths only: write .npz, or ask for coordinates with `realise=True`"
-        if isinstance(recovery, PlanarMesh):
-            what = "a mass matrix tells areas only: write .npz"
-        raise FormatError(f"the format {suffix} holds coordinates, and {what}")
+    if recovery.shapeless:
+        raise FormatError(
+            f"the format {suffix} holds coordinates, and {recovery.shapeless}: write .npz{recovery.instead}"
+        )
     kinds = set(cells_of(recovery)) - mesh_format.cells
     if kinds:
         what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"

@@ -4,7 +4,6 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import PurePath
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
-from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
+from .recovery import Recovery
 
 _SHARED = (
     *("status", "uniqueness", "reason", "advice", "operator", "element", "reaction", "density"),
@@ -34,27 +33,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
         ],
     }
-    if isinstance(recovery, PlanarMesh):
-        known |= {name: getattr(recovery, name) for name in ("chi_square", "estimated_noise", "n_entries", "n_fitting")}
-        known |= {
-            "largest_standard_deviation": recovery.largest_deviation,
-            "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
-            "alternatives": [asdict(other) for other in recovery.alternatives],
-        }
-    known |= {"quadrature": recovery.quadrature} if isinstance(recovery, ConformingMesh) else {}
-    if isinstance(recovery, Surface):
-        deviations = recovery.length_deviations
-        known |= {
-            "n_edges": len(recovery.edges),
-            "euler_characteristic": recovery.euler,
-            "orientable": recovery.orientable,
-            "genus": recovery.genus,
-            "n_boundary_loops": recovery.loops,
-            "largest_curvature": np.nanmax(np.abs(recovery.curvature)),
-            "chi_square": recovery.chi_square,
-            "largest_standard_deviation": None if deviations is None else np.nanmax(deviations),
-            "realisation": recovery.realisation,
-        }
+    known |= recovery.entries_of_report()
     if recovery.vector_valued:
         known |= {
             "dimension": recovery.dim,
@@ -62,12 +41,6 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "numbering": recovery.numbering,
             "operator_choice": recovery.choice,
             "cells": {kind: len(cells) for kind, cells in recovery.cells.items()},
-        }
-    if isinstance(recovery, Mechanical):
-        known |= {
-            "poisson_ratio": recovery.poisson_ratio if isinstance(recovery, Body) else None,
-            "position_error": recovery.position_error,
-            "evidence": [asdict(one) for one in recovery.evidence],
         }
     return _plain(known | {"timings": recovery.timings, "warnings": recovery.warnings, "version": __version__})
 

@@ -1,12 +1,10 @@
 """What there is to say about a recovery, for people: a few lines."""
 
-import math
-
 import numpy as np
 
-from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Structure, Surface
-from .tolerances import CERTIFIED, SUSPICIOUS
-from .words import count_of, kind_text
+from .recovery import Recovery
+from .tolerances import CERTIFIED
+from .words import count_of
 
 _SHOWN = 3
 _OTHERS = {
@@ -38,9 +36,9 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
     mesh = f"{cells}{count_of(recovery.n_points, 'point')}"
     mesh += f", {missing:,} of these without a position," if missing else ""
     fits = f"{mesh} give the matrix back to {recovery.backward_error:.1e} of each row's largest entry"
-    if not cells or (isinstance(recovery, Structure) and recovery.operator != "truss"):  # which has no other members
+    if not recovery.re_assembled:
         fits = f"{mesh} agree with all rows away from supports to {recovery.backward_error:.1e} (relative)"
-    if isinstance(recovery, PlanarMesh) and 0 < recovery.n_fitting < recovery.n_entries:
+    if 0 < recovery.n_fitting < recovery.n_entries:
         fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g} of it"
     written = f" (written: {files})" if files else ""
     after = recovery.advice or "see `report()` for all that is known"
@@ -70,23 +68,15 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
             for (_, several), more, count in _cell_counts(recovery)
         ),
     ]
-    if isinstance(recovery, ConformingMesh):
-        curved = "" if recovery.straight else ", with curved sides"
-        rows += [("element", f"{recovery.element}{curved}"), ("quadrature", recovery.quadrature)]
     meeting = f", meeting in {count_of(hinges, 'hinge')}" if hinges else ""
     rows.append(("pieces", f"{recovery.n_components:,}{meeting}"))
-    if isinstance(recovery, PlanarMesh):
-        rows += _planar_rows(recovery)
-    if isinstance(recovery, Surface):
-        rows += _surface_rows(recovery)
-    if isinstance(recovery, Mechanical):
-        rows += _mechanical_rows(recovery)
+    rows += recovery.facts()
     rows += [("density", f"{recovery.density:.10g}")] if recovery.density is not None else []
     rows.append(("backward error", f"{recovery.backward_error:.1e} (relative)"))
     if recovery.uniqueness is not None:
         rows.append(("other meshes", _OTHERS[recovery.uniqueness]))
     if not recovery.certified:  # what stands out first; what fits worst are often only its neighbours
-        suspects = recovery.suspects.tolist() if isinstance(recovery, PlanarMesh) else []
+        suspects = recovery.suspects.tolist()
         for pair, misfit in zip(recovery.worst_entries[:_SHOWN].tolist(), recovery.worst_misfits, strict=False):
             text = f"rows {pair[0]} and {pair[1]}, off by {misfit:.1e} of the row's largest entry"
             rows.append(("stands out" if pair in suspects else "worst fit", text))
@@ -94,41 +84,6 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         stages = ", ".join(f"{stage} {seconds:.2g}" for stage, seconds in recovery.timings.items() if seconds >= 0.005)
         rows.append(("time", f"{sum(recovery.timings.values()):.2f} s" + (f" ({stages})" if stages else "")))
     return rows + [("note", warning) for warning in recovery.warnings]
-
-
-def _planar_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
-    rows = [("holes", f"{mesh.n_holes:,}"), ("scale c", scale_text(mesh))]
-    if mesh.region is not None:
-        rows.insert(1, ("regions", f"{len(mesh.scale):,}, each with a factor of its own"))
-    if mesh.reaction:
-        rows.append(("reaction s", f"{mesh.reaction:.10g}"))
-    if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:
-        rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e} (absolute)"))
-    if mesh.largest_deviation is not None:
-        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate (absolute)"))
-    return rows
-
-
-def _surface_rows(surface: Surface) -> list[tuple[str, str]]:
-    pieces = zip(surface.euler, surface.orientable, surface.loops, strict=True)
-    rows = [("surface", kind_text(*piece)) for piece in list(pieces)[:_SHOWN]]
-    rows.append(("curvature", f"{np.nanmin(surface.curvature):.3g} to {np.nanmax(surface.curvature):.3g} at a vertex"))
-    if surface.realisation is not None:
-        text = f"edge lengths off by {surface.realisation['misfit']:.1e} (root mean square), one shape of possibly many"
-        rows.append(("coordinates", text))
-    return [*rows, ("scale c", scale_text(surface))]
-
-
-def _mechanical_rows(recovery: Mechanical) -> list[tuple[str, str]]:
-    rows = []
-    if isinstance(recovery, Body) and recovery.poisson_ratio is not None:
-        rows.append(("Poisson's ratio", f"{recovery.poisson_ratio:.10g}"))
-    if np.isfinite(recovery.scale).any():
-        rows.append(("shear modulus", scale_text(recovery)))
-    return rows + [
-        ("null space", f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}")
-        for one in recovery.evidence[:_SHOWN]
-    ]
 
 
 _KINDS = {
@@ -162,11 +117,3 @@ def counted_cells(recovery: Recovery) -> list[str]:
 def _points(recovery: Recovery, noun: str = "") -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     return f"{recovery.n_points:,}{noun}" + (f", of which {missing:,} not determined" if missing else "")
-
-
-def scale_text(recovery: Recovery, digits: int = 10) -> str:
-    """The factor c, or the range of those of all pieces."""
-    known = recovery.scale[np.isfinite(recovery.scale)]
-    low, high = (float(f(known)) if len(known) else math.nan for f in (np.min, np.max))
-    # Pieces of one matrix mostly share c, up to rounding.
-    return f"{low:.{digits}g}" if high - low <= 1e-9 * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"

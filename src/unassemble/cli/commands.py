@@ -66,7 +66,7 @@ def recover(
     unnamed = out is None and output is None
     out = target(matrix, out, output)
     options["refine"] = not options.pop("no_refine")
-    from ..export import check_output, without_points
+    from ..export import check_output
     from ..files import check_plot
     from ..formats import lacks_worth
     from ..progress import StageDisplay
@@ -75,7 +75,7 @@ def recover(
     check_files(matrix, {"OUT": (out, check_output), "--report": (report, check_report), "--plot": (plot, check_plot)})
     with StageDisplay(enabled=not quiet) as display:
         recovery = recovered(matrix, report, progress=display, **options)
-        if unnamed and without_points(recovery):
+        if unnamed and recovery.shapeless:
             out = target(matrix, None, None, ".mesh.npz")
         display("write")
         recovery.save(out)

@@ -110,8 +110,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     if len(nodal.indices) == nodal.n**2 and not request.named:
         # Of a rectangle, say, rows along y with those of opposite corners: those of its mirror image.
         another = Reason(
-            f"{sure}, but all nodes are coupled, as those of one element",
-            "which rows are of one node may be another choice",
+            "all nodes are coupled, as those of one element: which rows are of one node may be another choice",
+            sure,
             advice=GIVE_NUMBERING,
         )
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..elements.surface import outer_facets, planar_outlines
-from ..recovery import Body, ConformingMesh, Recovery, Structure, Surface
+from ..recovery import Recovery
 from . import style
 from .canvas import apart, panel
 from .mesh import draw_lines, extent, line_handle
@@ -36,16 +36,13 @@ def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[
     faces = _faces(recovery)
     if faces:
         _draw_faces(ax, recovery, faces, flat, depth)
-        what, colour = "outer surface" if recovery.dim == 3 else "boundary", style.OUTER
-        label = f"{what} of the recognised cells"
-        if isinstance(recovery, Structure):
-            label, colour = "cells of shells or plates, read off the graph", style.EDGE
-        if isinstance(recovery, Surface):
-            label, colour = "triangles, one shape of possibly many with their sides", style.EDGE
-        handles.append(line_handle(colour, label))
-    if isinstance(recovery, Structure) and len(recovery.lines):
-        order = np.argsort(depth[recovery.lines].mean(axis=1), kind="stable")
-        draw_lines(ax, flat[recovery.lines[order]], style.OUTER, float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
+        outside = f"{'outer surface' if recovery.dim == 3 else 'boundary'} of the recognised cells"
+        named = recovery.look.cells
+        handles.append(line_handle(style.EDGE if named else style.OUTER, named or outside))
+    lines = recovery.cells.get("line")
+    if lines is not None:
+        order = np.argsort(depth[lines].mean(axis=1), kind="stable")
+        draw_lines(ax, flat[lines[order]], style.OUTER, float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
         handles.append(line_handle(style.OUTER, "members"))
     elif len(recovery.boundary):
         draw_lines(ax, flat[recovery.boundary], style.OUTER, 1.2)
@@ -63,7 +60,7 @@ def _projected(points: NDArray) -> tuple[NDArray, NDArray]:
 def _faces(recovery: Recovery) -> list[NDArray]:
     """Polygons of nodes (m, k) to be filled; of bodies in space the outer facets that face the eye."""
     cells = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
-    if not isinstance(recovery, (Body, ConformingMesh)):
+    if not recovery.look.solid:
         return list(cells.values())
     if recovery.dim == 2:
         return [planar_outlines(kind, some) for kind, some in cells.items()]
@@ -84,9 +81,9 @@ def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArra
     large = len(order) > style.MOST_VECTOR
     colours: NDArray | str = style.FILL
     edge = style.EDGE
-    if isinstance(recovery, (Body, Surface)) and recovery.dim == 3:
+    if recovery.look.shaded and recovery.dim == 3:
         normals = np.concatenate([_normals(recovery.points[some]) for some in faces])
-        if isinstance(recovery, Surface):  # has two sides: that which is seen
+        if recovery.look.two_sided:
             normals = normals * np.sign(normals @ _TOWARDS)[:, None]
         shade = 0.3 + 0.7 * np.clip(normals[order] @ _LIGHT, 0, 1)[:, None]
         colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))

@@ -11,8 +11,8 @@ from ..clock import Clock
 from ..errors import FormatError
 from ..files import check_plot
 from ..metric import realised
-from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
-from ..summary import counted_cells, scale_text
+from ..recovery import PlanarMesh, Recovery, Surface
+from ..summary import counted_cells
 from ..words import count_of
 from . import style
 from .body import plot_body
@@ -34,11 +34,11 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
-        raise FormatError("a mass matrix tells areas only, and there is no shape to draw")
     if isinstance(recovery, Surface) and recovery.realisation is None:
         recovery = realised(recovery, Clock(), starts=1)  # edge lengths cannot be drawn
-    if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
+    if recovery.shapeless:
+        raise FormatError(f"{recovery.shapeless}, and there is no shape to draw")
+    if isinstance(recovery, PlanarMesh) and recovery.look.outlined:
         points = laid_out(recovery)
         figure, drawn = panel(extent(points, recovery.component >= 0), ax)
         handles: list[Artist] = [*draw_mesh(drawn, recovery, points, outer_loops(recovery))]
@@ -47,8 +47,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     else:
         figure, handles = plot_body(recovery, ax)
     if ax is None:
-        about = "edge lengths " if isinstance(recovery, Surface) and recovery.dim == 3 else ""
-        header(figure, about + recovery.status, _details(recovery), style.STATUS.get(recovery.status, style.TEXT))
+        header(figure, recovery.title, _details(recovery), style.STATUS.get(recovery.status, style.TEXT))
         footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
@@ -63,11 +62,6 @@ def _details(recovery: Recovery) -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")
-    if isinstance(recovery, Surface) and recovery.realisation is not None and recovery.dim == 3:
-        parts.append(f"edge lengths off by {recovery.realisation['misfit']:.1e}")
-    if not isinstance(recovery, Mechanical):
-        parts.append(f"c = {scale_text(recovery, 6)}")
-    elif isinstance(recovery, Body) and recovery.poisson_ratio is not None:
-        parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")
+    parts += recovery.details()
     parts.append(f"backward error {recovery.backward_error:.1e}")
     return "  ·  ".join(parts)

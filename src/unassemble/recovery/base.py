@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..certificate import UNJUDGED, Status, Uniqueness, Verdict
+from ..tolerances import AGREED
 from ..words import sentences
 
 if TYPE_CHECKING:
@@ -21,6 +23,17 @@ if TYPE_CHECKING:
 def none_of(*columns: int) -> Callable[[], NDArray[np.int64]]:
     """Default of a field of indices: none, each of so many columns."""
     return lambda: np.empty((0, *columns), np.int64)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a picture shows the cells of a kind of result."""
+
+    outlined: bool = False  # by their sides and the boundary loops, in place of filled cells
+    solid: bool = True  # whether they hide each other, so that only the outside is drawn
+    shaded: bool = True  # by their orientation in space
+    two_sided: bool = False  # whether the side that is seen is the outside
+    cells: str = ""  # what they are called in the legend; by default the outside of the recognised cells
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -65,12 +78,17 @@ class Recovery:
     worst_entries: NDArray[np.int64] = field(default_factory=none_of(2))
     #: (k,) their misfit, as in `backward_error`.
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    suspects: NDArray[np.int64] = field(default_factory=none_of(2))  #: (k, 2) those that stand out from all others.
+    n_entries: int = 0  #: Entries above the diagonal, where all were compared.
+    n_fitting: int = 0  #: Those that the mesh gives back to 1e-9 of their row's largest.
     node_of_row: NDArray[np.int64] | None = None  #: (N,) node of each matrix row, if it is vector-valued.
     direction_of_row: NDArray[np.int64] | None = None  #: (N,) and its direction.
     #: Of vector-valued matrices, how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
     #: order, found by the pattern) or ``"given"``.
     numbering: str = ""
     choice: str = ""  #: Why the matrix was taken for this operator's, where that was not asked for.
+
+    look: ClassVar[Look] = Look()
 
     # Put here by :mod:`unassemble.outputs`.
     report: ClassVar[Callable[..., dict[str, Any]]]
@@ -140,6 +158,55 @@ class Recovery:
         kinds = {ELEMENT_NAMES[kind] for kind in self.cells if kind in ELEMENT_NAMES}
         kinds |= {"P1"} if self.n_polygons else set()  # one stands for triangles
         return "mixed" if len(kinds) > 1 else next(iter(kinds), None)
+
+    @property
+    def shapeless(self) -> str:
+        """Why there are no points to write or to draw; empty where there are."""
+        return ""
+
+    @property
+    def instead(self) -> str:
+        """How points can be had all the same where there are none, to follow "write .npz"."""
+        return ""
+
+    @property
+    def re_assembled(self) -> bool:
+        """Whether cells were assembled again; else rows were tested, those away from supports."""
+        return bool(self.n_cells) or not self.vector_valued
+
+    @property
+    def title(self) -> str:
+        """What a picture of it is headed by."""
+        return self.status
+
+    def details(self) -> list[str]:
+        """What only this kind of result says below the title of its picture."""
+        return [f"c = {self.scale_text(6)}"]
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Names and values of what only this kind of result has, for people."""
+        return []
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """What only this kind of result has, for programs."""
+        return {}
+
+    def point_data(self) -> dict[str, NDArray]:
+        """What only this kind of result has at each point."""
+        return {}
+
+    def boundary_flag(self) -> NDArray[np.int64]:
+        """(n,) 1 for points on the outside of the mesh, else 0."""
+        flag = np.zeros(self.n_points, dtype=np.int64)
+        flag[self.boundary] = 1
+        return flag
+
+    def scale_text(self, digits: int = 10) -> str:
+        """The factor c, or the range of those of all pieces."""
+        known = self.scale[np.isfinite(self.scale)]
+        low, high = (float(f(known)) if len(known) else math.nan for f in (np.min, np.max))
+        # Pieces of one matrix mostly share c, up to rounding.
+        return f"{low:.{digits}g}" if high - low <= AGREED * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"
 
     @property
     def dim(self) -> int:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import Recovery, none_of, occurring, with_mid_nodes
+from ..elements.surface import outer_nodes
+from .base import Look, Recovery, none_of, occurring, with_mid_nodes
+
+_SHOWN = 3  # pieces that a summary describes
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,26 @@ class Mechanical(Recovery):
     #: (m, 4) cells of four corners, counter-clockwise in the plane.
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
 
+    def details(self) -> list[str]:
+        """Nothing: the size is free, or the matrix's own."""
+        return []
+
+    def facts(self) -> list[tuple[str, str]]:
+        """The null space of each piece's identities."""
+        rows = [("shear modulus", self.scale_text())] if np.isfinite(self.scale).any() else []
+        return rows + [
+            ("null space", f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}")
+            for one in self.evidence[:_SHOWN]
+        ]
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """The material, how far positions may be off, and the null spaces."""
+        return {
+            "poisson_ratio": None,
+            "position_error": self.position_error,
+            "evidence": [asdict(one) for one in self.evidence],
+        }
+
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Body(Mechanical):
@@ -55,10 +79,32 @@ class Body(Mechanical):
         corners = occurring(triangle=self.triangles, quad=self.quads, tetra=self.tetrahedra, hexahedron=self.hexahedra)
         return with_mid_nodes(corners, self.mid_nodes)
 
+    def details(self) -> list[str]:
+        """Poisson's ratio, where it is one number."""
+        return [] if self.poisson_ratio is None else [f"Poisson's ratio {self.poisson_ratio:.6g}"]
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Poisson's ratio besides, where it is one number."""
+        ratio = [] if self.poisson_ratio is None else [("Poisson's ratio", f"{self.poisson_ratio:.10g}")]
+        return ratio + super().facts()
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """Poisson's ratio besides."""
+        return super().entries_of_report() | {"poisson_ratio": self.poisson_ratio}
+
+    def boundary_flag(self) -> NDArray[np.int64]:
+        """(n,) 1 for points on the outside, else 0; in space those of outer facets."""
+        flag = super().boundary_flag()
+        if self.dim == 3 and self.n_cells:
+            flag[outer_nodes(self.cells)] = 1
+        return flag
+
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Structure(Mechanical):
     """A frame, shell, plate or truss."""
+
+    look: ClassVar[Look] = Look(solid=False, shaded=False, cells="cells of shells or plates, read off the graph")
 
     lines: NDArray[np.int64] = field(default_factory=none_of(2))  #: (m, 2) members.
 
@@ -66,6 +112,21 @@ class Structure(Mechanical):
     def cells(self) -> dict[str, NDArray[np.int64]]:
         """Members and shell cells, each kind that occurs, by meshio's names."""
         return occurring(line=self.lines, triangle=self.triangles, quad=self.quads)
+
+    @property
+    def re_assembled(self) -> bool:
+        """Whether all its members are bars, which were assembled again."""
+        return self.operator == "truss"
+
+    def boundary_flag(self) -> NDArray[np.int64]:
+        """(n,) 1 for ends of members, and nodes of shell cells that are on their outside; else 0."""
+        flag = super().boundary_flag()
+        if self.dim == 3:
+            flag[self.lines] = 1
+            shells = {kind: cells for kind, cells in self.cells.items() if kind != "line"}
+            if shells:
+                flag[outer_nodes(shells)] = 1
+        return flag
 
     @property
     def element(self) -> None:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import SUSPICIOUS
 from ..topology.polygons import Polygons
-from .base import Recovery, none_of, occurring, with_mid_nodes
+from ..words import kind_text
+from .base import Look, Recovery, none_of, occurring, with_mid_nodes
 
 if TYPE_CHECKING:
     from ..cells import Alternative
+
+_SHOWN = 3  # pieces that a summary describes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PlanarMesh(Recovery):
     """A planar mesh of triangles: from a scalar matrix, or from directions that are not coupled."""
+
+    look: ClassVar[Look] = Look(outlined=True)
 
     n_holes: int  #: Bounded boundary loops, over all pieces.
     polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))  #: (polygons + 1,)
@@ -34,16 +40,12 @@ class PlanarMesh(Recovery):
     estimated_noise: float | None = None
     #: ``"mass"``, ``"coefficient"`` or ``"one sign"``, a term that the model lacks, where that explains the misfit.
     missing_term: str = ""
-    #: (k, 2) entries that stand out from the misfit of their piece, at most one of each.
-    suspects: NDArray[np.int64] = field(default_factory=none_of(2))
     #: (m,) of a mass matrix, which tells no shape, s times the areas of the triangles; `points` are NaN.
     areas: NDArray[np.float64] | None = None
     #: (n,) the diagonal matrix S, of geometric mean 1, where the matrix is S c L S.
     row_scaling: NDArray[np.float64] | None = None
     #: Cells in doubt where other meshes fit as well, and what these have instead.
     alternatives: tuple[Alternative, ...] = ()
-    n_entries: int = 0  #: Entries above the diagonal.
-    n_fitting: int = 0  #: Those that the mesh gives back to 1e-9 of their row's largest.
     #: (k, 2) vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
     eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     #: (m,) of each cell, where coefficients are constant on regions; `scale` has one factor for each region then.
@@ -72,6 +74,45 @@ class PlanarMesh(Recovery):
             return None
         return float(np.nanmax(deviations))
 
+    @property
+    def shapeless(self) -> str:
+        """That areas alone are known, where that is so."""
+        return "" if self.areas is None else "a mass matrix tells areas only"
+
+    def facts(self) -> list[tuple[str, str]]:
+        """Holes, factors, terms and error bars."""
+        rows = [("holes", f"{self.n_holes:,}")]
+        if self.region is not None:
+            rows.append(("regions", f"{len(self.scale):,}, each with a factor of its own"))
+        rows.append(("scale c", self.scale_text()))
+        if self.reaction:
+            rows.append(("reaction s", f"{self.reaction:.10g}"))
+        if self.estimated_noise is not None and self.backward_error > SUSPICIOUS:
+            much = f"the misfit is that of a standard deviation of {self.estimated_noise:.1e} (absolute)"
+            rows.append(("noise", much))
+        if self.largest_deviation is not None:
+            rows.append(("std deviation", f"at most {self.largest_deviation:.1e} in a coordinate (absolute)"))
+        return rows
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """Tests of the misfit, error bars, what stands out, and other meshes."""
+        return {
+            "chi_square": self.chi_square,
+            "estimated_noise": self.estimated_noise,
+            "n_entries": self.n_entries,
+            "n_fitting": self.n_fitting,
+            "largest_standard_deviation": self.largest_deviation,
+            "suspects": [{"row": i, "column": j} for i, j in self.suspects],
+            "alternatives": [asdict(other) for other in self.alternatives],
+        }
+
+    def point_data(self) -> dict[str, NDArray]:
+        """One standard deviation of each coordinate."""
+        if self.standard_deviations is None:
+            return {}
+        columns = zip("xyz", self.standard_deviations.T, strict=False)
+        return {f"standard_deviation_{name}": np.ascontiguousarray(column) for name, column in columns}
+
     def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Triangles (m, 3), with the polygons in fans.
 
@@ -91,6 +132,8 @@ class PlanarMesh(Recovery):
 class ConformingMesh(PlanarMesh):
     """A planar mesh of other elements than linear triangles, or of these beside quadrilaterals."""
 
+    look: ClassVar[Look] = Look()
+
     #: (m, 4) quadrilaterals, counter-clockwise. Of quadratic and cubic cells, as in `triangles`, these are the corners.
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
     #: (m, k) the nodes that each cell of a higher order has besides its corners, in meshio's order; else empty.
@@ -108,6 +151,15 @@ class ConformingMesh(PlanarMesh):
         """Cells of each kind, which are elements as they are."""
         return self.cells
 
+    def facts(self) -> list[tuple[str, str]]:
+        """The element and its quadrature besides."""
+        curved = "" if self.straight else ", with curved sides"
+        return [("element", f"{self.element}{curved}"), ("quadrature", self.quadrature), *super().facts()]
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """The quadrature besides."""
+        return super().entries_of_report() | {"quadrature": self.quadrature}
+
     @property
     def rules(self) -> dict[str, str]:
         """The quadrature that integrates each kind, as far as `quadrature` tells."""
@@ -124,6 +176,10 @@ class Surface(Recovery):
     triangle, loop by loop, in no order and direction.
     """
 
+    look: ClassVar[Look] = Look(
+        solid=False, two_sided=True, cells="triangles, one shape of possibly many with their sides"
+    )
+
     edges: NDArray[np.int64]  #: (e, 2) sides of the triangles, rows i < j.
     edge_lengths: NDArray[np.float64]  #: (e,) mean 1 in each piece.
     #: (n,) what the angles about a vertex lack of 2 pi, or of pi on the boundary; added up where several sheets touch
@@ -138,6 +194,60 @@ class Surface(Recovery):
     realisation: Mapping[str, Any] | None = None
     chi_square: Mapping[str, float] | None = None  #: With noise, the test that rows sum to zero, as in `PlanarMesh`.
     length_deviations: NDArray[np.float64] | None = None  #: (e,) with noise, on request, one standard deviation.
+
+    @property
+    def shapeless(self) -> str:
+        """That lengths alone are known, unless coordinates were asked for."""
+        if np.isfinite(self.points).any():
+            return ""
+        return "the matrix of a surface tells edge lengths only"
+
+    @property
+    def instead(self) -> str:
+        """By asking for coordinates that have the lengths."""
+        return ", or ask for coordinates with `realise=True`"
+
+    @property
+    def title(self) -> str:
+        """The status, which is that of the edge lengths where coordinates are one shape of many."""
+        return f"edge lengths {self.status}" if self.dim == 3 else self.status
+
+    def details(self) -> list[str]:
+        """How far off edge lengths are where coordinates are one shape of many, and the factor."""
+        rows = []
+        if self.realisation is not None and self.dim == 3:
+            rows.append(f"edge lengths off by {self.realisation['misfit']:.1e}")
+        return rows + super().details()
+
+    def facts(self) -> list[tuple[str, str]]:
+        """What kind of surface each piece is, its curvature, and how well coordinates have its lengths."""
+        pieces = zip(self.euler, self.orientable, self.loops, strict=True)
+        rows = [("surface", kind_text(*piece)) for piece in list(pieces)[:_SHOWN]]
+        low, high = np.nanmin(self.curvature), np.nanmax(self.curvature)
+        rows.append(("curvature", f"{low:.3g} to {high:.3g} at a vertex"))
+        if self.realisation is not None:
+            off = f"edge lengths off by {self.realisation['misfit']:.1e} (root mean square)"
+            rows.append(("coordinates", f"{off}, one shape of possibly many"))
+        return [*rows, ("scale c", self.scale_text())]
+
+    def entries_of_report(self) -> dict[str, Any]:
+        """The kind of surface, its curvature, error bars, and how well coordinates have its lengths."""
+        deviations = self.length_deviations
+        return {
+            "n_edges": len(self.edges),
+            "euler_characteristic": self.euler,
+            "orientable": self.orientable,
+            "genus": self.genus,
+            "n_boundary_loops": self.loops,
+            "largest_curvature": np.nanmax(np.abs(self.curvature)),
+            "chi_square": self.chi_square,
+            "largest_standard_deviation": None if deviations is None else np.nanmax(deviations),
+            "realisation": self.realisation,
+        }
+
+    def point_data(self) -> dict[str, NDArray]:
+        """The curvature of each vertex."""
+        return {"curvature": self.curvature}
 
     @property
     def flat(self) -> bool:
