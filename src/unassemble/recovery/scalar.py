@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import FLAT
 from ..topology.polygons import Polygons
 from .base import Recovery, none_of, occurring, with_mid_nodes
 
@@ -144,7 +145,7 @@ class Surface(Recovery):
         """Whether the angles about every vertex inside add up to a full turn, up to rounding."""
         inside = np.isfinite(self.curvature)
         inside[self.boundary] = False
-        return bool(np.abs(self.curvature[inside]).max(initial=0.0) < 1e-8)
+        return bool(np.abs(self.curvature[inside]).max(initial=0.0) < FLAT)
 
     @property
     def fits_no_plane(self) -> bool:
