@@ -55,6 +55,9 @@ NEARLY_ALL = 0.9
 PLACED = 1e-8
 """How far off positions may be, relative to the size of what is placed, where it is certified."""
 
+FLAT = 1e-8
+"""Radians by which angles about a vertex may miss a full turn where the surface is flat there: rounding leaves less."""
+
 # The certificate.
 
 CERTIFIED = 1e-9

@@ -59,7 +59,15 @@ def recover_with_terms(
             found = _unscaled(held, plain, clock)
         elif triangles:
             found = with_consistent_mass(held, topology, plain, clock)
-    return found or plain(matrix)
+    if found is None:
+        return plain(matrix)
+    if found.status != "uncertified":
+        return found
+    # A term that does not fit explains nothing, and the entries may be those of c L + D as they stand.
+    with suppress(RecoveryError):
+        without = plain(matrix)
+        return without if without.status != "uncertified" else found
+    return found
 
 
 def recover_elements_with_terms(
@@ -105,13 +113,18 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
 
 
 def _unscaled(held: RowSums, plain: Plain, clock: Clock) -> PlanarMesh | None:
-    """The mesh of S c L S; None where no positive vector is annihilated."""
+    """The mesh of S c L S; None where no positive vector is annihilated, or a small D explains the row sums as well."""
     matrix = held.matrix
     with clock("scaling"):
         null = _positive_null_vector(matrix)
     if null is None:
         return None
     null = null / np.exp(np.log(null).mean())
+    if np.abs(null - 1).max() <= ALIKE:  # as of any D next to nothing, with which the entries are those of c L
+        with suppress(RecoveryError):
+            found = plain(matrix)
+            if found.status != "uncertified":
+                return found
     i, j = matrix.edges.T
     found = plain(replace(matrix, entries=matrix.entries * null[i] * null[j], diagonal=matrix.diagonal * null**2))
     note = "S and c are known up to a factor that one could give the other: the geometric mean of S is 1"

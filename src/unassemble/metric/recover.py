@@ -22,7 +22,7 @@ from ..topology.numbering import connected
 from ..words import Reason, count_of
 from .mesh import SurfaceMesh
 from .program import Metric, solve_metric
-from .verdict import READINGS, Found, findings, length_deviations, row_sum_test
+from .verdict import READINGS, VARYING, Found, findings, length_deviations, row_sum_test
 
 
 def recover_surface(
@@ -94,6 +94,9 @@ def _recovered(
                 "sums back, but so may several vertices in a hole"
             )
             found_out = replace(found_out, another=several)
+    fits = not found_out.objections and found_out.another is None
+    if fits and options.scale is None and not best.constant:
+        notes.append(VARYING)
 
     def compare(surface: Surface) -> Certificate:
         """Of the surface as it is written; with vertices that were put back of that which has them."""

@@ -13,7 +13,7 @@ from ..certificate import Findings, MetricCertificate, chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
+from ..tolerances import CERTIFIED, CONFIDENCE, FLAT, LARGEST_NOISE
 from ..topology.manifold import Cycles
 from ..words import Reason, words_of
 from .heron import areas_cotangents, blocks_of, summed
@@ -21,6 +21,10 @@ from .mesh import SurfaceMesh
 from .program import Normal
 
 READINGS = 16  # as many choices of triangles as are tried one by one
+VARYING = (
+    "that the coefficient is constant is assumed, and the matrix does not show it: with a coefficient of its own in "
+    "each triangle, surfaces of other lengths have the same entries"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,23 @@ class Found:
         """Whether every entry is given back."""
         held = self.certificate.entries
         return not self.failures and held.backward_error <= CERTIFIED and not len(held.flipped)
+
+    @property
+    def constant(self) -> bool:
+        """Whether something beside the lengths shows that the coefficient is constant.
+
+        There are as many lengths as entries, so that with a coefficient of its own in each triangle nearly any entries
+        are those of some surface, whose rows sum to zero as well. But then its vertices inside are not flat, nor are
+        row sums in proportion to the areas that the lengths give.
+        """
+        if self.certificate.diagonal == "areas":
+            return True
+        inside = np.ones(self.mesh.n, dtype=bool)
+        inside[self.mesh.edges[self.mesh.boundary]] = False
+        curvature = self.mesh.curvature(self.squared)
+        flat = inside & (np.abs(curvature) <= FLAT)
+        checked = np.unique(self.mesh.piece[flat[self.mesh.triangles].any(axis=1)])
+        return bool((flat == (inside & np.isfinite(curvature))).all() and len(checked) == self.mesh.n_pieces)
 
     def without_last(self, gone: int) -> Found:
         """What is left without the last vertices, none of which are neighbours."""
@@ -63,14 +84,12 @@ def findings(
     a lumped mass matrix makes them; or in a scale that was given. Rows next to others that were taken out do not.
     """
     fits = "the lengths give every entry back, and no others do on these triangles"
-    about = Findings(
-        fits=(fits,),
-        error=found.certificate.entries.backward_error,
-        unique="proved" if n_cycles == len(found.mesh.triangles) else "searched",
-    )
+    about = Findings(fits=(fits,), error=found.certificate.entries.backward_error, unique="searched")
     against = tuple(_misfits(found, options))
     if against:
         return replace(about, objections=against)
+    if n_cycles == len(found.mesh.triangles) and (options.scale is not None or found.constant):
+        about = replace(about, unique="proved")
     bare = np.bincount(found.mesh.piece_of_edge, ~solid) == 0
     if bare.any():
         row = int(found.mesh.triangles[found.mesh.piece == np.argmax(bare)].min())

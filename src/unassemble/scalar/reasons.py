@@ -29,7 +29,7 @@ _GIVE_NOISE = "if the entries are measured, give the standard deviation of their
 
 def objections(f: Finished) -> Iterator[Reason]:
     """All that speaks against a mesh, the gravest first, each with what to do about it; nothing where it is right."""
-    apart = _discord(f.solved, f.certificate.backward_error)
+    apart = _discord(f.solved, f.certificate.backward_error, f.near.by_noise)
     for said, advice in _doubts(f, apart) if f.near.passes else _misfits(f, apart):
         yield Reason(said, advice=advice)
     if f.near.passes and not f.compared.written.passes:
@@ -188,13 +188,14 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
     )
 
 
-def _discord(solved: Solved, backward_error: float) -> str:
+def _discord(solved: Solved, backward_error: float, noise: Noise | None) -> str:
     """What is wrong where pieces share vertices but not c, errors of entries allowed for; empty if nothing is.
 
     Each piece by itself has its own c, and errors move it. Where the noise is known the others have been fitted with
-    the c of their leaders, if at all.
+    the c of their leaders, if at all. `noise`: that which decides; None where the mesh has entries of few digits
+    exactly, so that nothing shows that they were rounded.
     """
-    topology, noise, c = solved.topology, solved.noise, solved.scales
+    topology, c = solved.topology, solved.scales
     if not len(topology.hinges):
         return ""
     lead = leaders(topology, solved.spare)
