@@ -16,6 +16,12 @@ from ..tolerances import ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .placed import Placed
 
+_LOADED = (
+    "sums of moments are not whole, or contradict those of forces, and forces alone do not tell the size of this "
+    "structure: with axial forces in its members, or springs between its nodes, they fit another size as well"
+)
+_WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without springs"
+
 
 @dataclass(frozen=True, eq=False)
 class Held:
@@ -40,6 +46,8 @@ class Held:
         """Status and reason."""
         holds, left = self.said
         objection = known.objection(self.error, self.rounding, left)
+        if objection is None and found.loaded:
+            objection = Reason(_LOADED, _WITHOUT_LOADS)
         if objection is None and found.unnoticed.any():
             count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
             unseen = (
