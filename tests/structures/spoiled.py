@@ -96,3 +96,47 @@ def tied(given: Built, seed: int = 0, *, share: float = 0.1, alike: bool = True)
         values = np.concatenate([stiffness, stiffness, -stiffness, -stiffness])
         matrix = matrix + sp.csr_array((values, place), shape=matrix.shape)
     return replace(given, matrix=sp.csr_array(matrix))
+
+
+def constrained(given: Built, masters, slaves: list, directions=(0, 1, 5)) -> tuple[sp.csr_array, np.ndarray]:
+    """A structure some of whose unknowns follow those of masters as on rigid bodies, and so are no unknowns; T^T A T.
+
+    With `directions` (0, 1, 5) bodies are floors that are rigid in their plane: rows of other nodes have the others.
+    `masters` are positions (k, 3), of nodes of their own with these directions only, which come last. With positions
+    (N, 3) of the nodes of all rows that are left.
+    """
+    n, moved = given.matrix.shape[0], np.asarray(directions)
+    follower = np.full(len(given.points), -1)
+    for k, some in enumerate(slaves):
+        follower[some] = k
+    bound = np.zeros(n, dtype=bool)
+    bound[(6 * np.flatnonzero(follower >= 0)[:, None] + moved).ravel()] = True
+    free = np.flatnonzero(~bound)
+    turn = sp.lil_array((n, len(free) + len(moved) * len(masters)))
+    turn[free, np.arange(len(free))] = 1
+    for node in np.flatnonzero(follower >= 0):
+        arm = given.points[node] - masters[follower[node]]
+        motion = np.eye(6)
+        for axis in range(3):
+            motion[:3, 3 + axis] = np.cross(np.eye(3)[axis], arm)
+        start = len(free) + len(moved) * follower[node]
+        for row in moved:
+            turn[6 * node + row, start + np.arange(len(moved))] = motion[row, moved]
+    turn = sp.csr_array(turn)
+    places = np.concatenate([given.points[free // 6], np.repeat(np.asarray(masters), len(moved), axis=0)])
+    return sp.csr_array(turn.T @ given.matrix @ turn), places
+
+
+def storeys(
+    counts=(3, 2, 4), seed: int = 0, *, off: float = 0.0, step=(5.0, 4.0, 3.0)
+) -> tuple[sp.csr_array, np.ndarray]:
+    """A building, clamped at the ground, whose floors are rigid in their plane; and places of its rows' nodes."""
+    rng = np.random.default_rng(seed)
+    points, ends = grid(counts)
+    points = points * np.asarray(step)
+    points[:, :2] += rng.uniform(-off, off, (len(points), 2)) if off else 0.0
+    given = assembled(members_on(points, ends, rng, equal=off == 0, round_section=False), points, ends)
+    given = given.clamped(points[:, 2] < 0.1)
+    levels = np.unique(given.points[:, 2])
+    floors = [np.flatnonzero(given.points[:, 2] == level) for level in levels]
+    return constrained(given, [given.points[some].mean(axis=0) for some in floors], floors)
