@@ -17,6 +17,12 @@ from ..tolerances import CERTIFIED, ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .placed import Placed
 
+_LOADED = (
+    "sums of moments are not whole, or contradict those of forces, and forces alone do not tell the size of this "
+    "structure: with axial forces in its members, or springs between its nodes, they fit another size as well"
+)
+_WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without springs"
+
 
 @dataclass(frozen=True, eq=False)
 class HeldStructure:
@@ -40,6 +46,8 @@ class HeldStructure:
     def objections(self, found: Placed, known: Known) -> Iterator[Reason]:
         """What speaks against the positions."""
         yield from known.objections(self.error, self.rounding, self.said[1])
+        if found.loaded:
+            yield Reason(_LOADED, advice=_WITHOUT_LOADS)
         if found.unnoticed.any():
             count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
             unseen = (

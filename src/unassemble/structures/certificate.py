@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
-from ..tolerances import CANCELLED
+from ..tolerances import ALIKE, CANCELLED
 from .layouts import PLANE, Layout
 from .members import balanced
 from .nodes import Nodes
@@ -91,6 +91,22 @@ def mispaired(
     strange &= known[first] | known[second]
     k = np.argmax(strange) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
+
+
+def in_one_place(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tuple[int, int] | None:
+    """Two coupled nodes without a distance that are not known to have none; None if there are no such nodes.
+
+    Of a plate, a plane frame or a beam the matrix tells no coordinate across it, so that a column between two rigid
+    floors has no length. In space an element between two nodes in one place, a hinge, has a symmetric block.
+    """
+    pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
+    pairs = pairs[determined(points)[pairs].all(axis=1)]
+    length = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    short = pairs[length <= ALIKE * np.median(length)] if len(pairs) else pairs
+    if nodes.layout.dim == 3:
+        hinges, whole = balanced(nodes, points, short[:, 0], short[:, 1], allowed)
+        short = short[~(hinges & whole)]
+    return (int(short[0, 0]), int(short[0, 1])) if len(short) else None
 
 
 def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:

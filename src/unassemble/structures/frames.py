@@ -14,7 +14,7 @@ from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason, count_of
 from .answer import HeldStructure, about_loose, answer
-from .certificate import forces, members_misfits, mispaired
+from .certificate import forces, in_one_place, members_misfits, mispaired
 from .contradicted import said_of
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
@@ -22,6 +22,12 @@ from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
 from .turning import turning_positions
+
+_LENGTH = (
+    "what joins them has a length that the matrix does not show, as columns have between floors that constraints hold "
+    "rigid"
+)
+_WITHOUT_CONSTRAINTS = "assemble the matrix without constraints between nodes"
 
 
 def serve_structure(numbering: StructuralNumbering, request: Request) -> Structure:
@@ -42,7 +48,12 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
         return again.points, forces(other, numbering, nodes, again.points, valid)[0]
 
     def doubt() -> Reason | None:
-        """Whether rows of different nodes were joined."""
+        """Whether rows of different nodes were joined, or nodes came out in one place that are not."""
+        near = in_one_place(nodes, straight, max(CANCELLED, spread))
+        if near is not None:
+            first, second = (np.flatnonzero(node == one)[0] for one in near)
+            together = f"the nodes of rows {first} and {second} are coupled and would lie in one place"
+            return Reason(f"{together}: {_LENGTH}", advice=_WITHOUT_CONSTRAINTS)
         inner: NDArray[np.bool_] = np.asarray(valid[:, :moves].all(axis=(1, 2)))
         pair = None if numbering.kind == "given" else mispaired(nodes, straight, inner, max(CANCELLED, spread))
         if pair is None:

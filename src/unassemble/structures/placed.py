@@ -60,6 +60,8 @@ class Placed:
     used: NDArray[np.bool_]  # (m,) equations that these positions rest on
     unnoticed: NDArray[np.bool_]  # (m,) those of them that a disturbance would change without being noticed
     notes: tuple[str, ...] = ()
+    # whether only forces say where the nodes of a piece are, and would fit as well if these were under loads
+    loaded: bool = False
     # nodes whose rows contradict the others, and were left out
     spoiled: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 

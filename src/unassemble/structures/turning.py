@@ -15,6 +15,7 @@ from .contradicted import contradicted
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .least_squares import least_squares, unnoticed_in, up_to_size
+from .loads import told_under_loads
 from .nodes import Nodes
 from .placed import Piece, Placed, placed, without_free
 from .straight import Straight
@@ -55,6 +56,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
         except GeometryError as error:
             failure = failure or error
             continue
+        found = _under_loads(found, given, layout, edges, allowed)
         left = given[~found.used & (given.row >= 0)]
         counted.reshape(-1, counted.shape[2])[left.row, left.rotation] = False
         attempts.append((found, counted))
@@ -67,10 +69,29 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     return without_free(found, most), counted
 
 
+def _under_loads(found: Placed, given: Equations, layout: Layout, edges: NDArray[np.int64], allowed: float) -> Placed:
+    """The same, in doubt where only forces tell positions, and loads could change those of most nodes unnoticed.
+
+    Without rotations no size is told at all. Where moments are used, they contradict loads.
+    """
+    if not layout.rotations or found.residual > allowed:
+        return found
+    used = given[found.used]
+    moments = (used.row >= 0) & (used.row % layout.block_size >= len(layout.displacements))
+    node = used.row // layout.block_size
+    checked = np.unique(found.component[node[moments]])
+    told = None
+    for piece in np.setdiff1d(found.component[found.component >= 0], checked):
+        told = told_under_loads(used, layout, found, edges) if told is None else told
+        if 2 * np.count_nonzero(told & (found.component == piece)) < np.count_nonzero(found.component == piece):
+            return replace(found, loaded=True)
+    return found
+
+
 def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
     """What speaks against positions, the gravest first."""
     free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
-    return found.residual > allowed, free, bool(found.unnoticed.any()), lost, found.residual
+    return found.residual > allowed, free, bool(found.unnoticed.any()) or found.loaded, lost, found.residual
 
 
 def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
