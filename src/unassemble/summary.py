@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from .recovery import Recovery
+from .recovery import SHOWN, Recovery
 from .tolerances import CERTIFIED
 from .words import count_of
 
-_SHOWN = 3
 _OTHERS = {
     "proved": "none fits",
     "searched": "none found that fits",
@@ -77,7 +76,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         rows.append(("other meshes", _OTHERS[recovery.uniqueness]))
     if not recovery.certified:  # what stands out first; what fits worst are often only its neighbours
         suspects = recovery.suspects.tolist()
-        for pair, misfit in zip(recovery.worst_entries[:_SHOWN].tolist(), recovery.worst_misfits, strict=False):
+        for pair, misfit in zip(recovery.worst_entries[:SHOWN].tolist(), recovery.worst_misfits, strict=False):
             text = f"rows {pair[0]} and {pair[1]}, off by {misfit:.1e} of the row's largest entry"
             rows.append(("stands out" if pair in suspects else "worst fit", text))
     if recovery.timings:

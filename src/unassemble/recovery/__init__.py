@@ -3,7 +3,7 @@
 Files, reports, pictures and near-null spaces are made of a result from above, in :mod:`unassemble.outputs`.
 """
 
-from .base import ELEMENT_NAMES as ELEMENT_NAMES, Recovery as Recovery
+from .base import ELEMENT_NAMES as ELEMENT_NAMES, SHOWN as SHOWN, Recovery as Recovery
 from .finish import (
     Comparison as Comparison,
     Examined as Examined,

@@ -25,6 +25,9 @@ def none_of(*columns: int) -> Callable[[], NDArray[np.int64]]:
     return lambda: np.empty((0, *columns), np.int64)
 
 
+SHOWN = 3  # pieces, or entries that fit worst, that a summary names
+
+
 @dataclass(frozen=True)
 class Look:
     """How a picture shows the cells of a kind of result."""

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elements.surface import outer_nodes
-from .base import Look, Recovery, none_of, occurring, with_mid_nodes
-
-_SHOWN = 3  # pieces that a summary describes
+from .base import SHOWN, Look, Recovery, none_of, occurring, with_mid_nodes
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Mechanical(Recovery):
         rows = [("shear modulus", self.scale_text())] if np.isfinite(self.scale).any() else []
         return rows + [
             ("null space", f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}")
-            for one in self.evidence[:_SHOWN]
+            for one in self.evidence[:SHOWN]
         ]
 
     def entries_of_report(self) -> dict[str, Any]:

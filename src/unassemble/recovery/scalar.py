@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from ..tolerances import FLAT, SUSPICIOUS
 from ..topology.polygons import Polygons
 from ..words import kind_text
-from .base import Look, Recovery, none_of, occurring, with_mid_nodes
+from .base import SHOWN, Look, Recovery, none_of, occurring, with_mid_nodes
 
 if TYPE_CHECKING:
     from ..cells import Alternative
-
-_SHOWN = 3  # pieces that a summary describes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -222,7 +220,7 @@ class Surface(Recovery):
     def facts(self) -> list[tuple[str, str]]:
         """What kind of surface each piece is, its curvature, and how well coordinates have its lengths."""
         pieces = zip(self.euler, self.orientable, self.loops, strict=True)
-        rows = [("surface", kind_text(*piece)) for piece in list(pieces)[:_SHOWN]]
+        rows = [("surface", kind_text(*piece)) for piece in list(pieces)[:SHOWN]]
         low, high = np.nanmin(self.curvature), np.nanmax(self.curvature)
         rows.append(("curvature", f"{low:.3g} to {high:.3g} at a vertex"))
         if self.realisation is not None:
