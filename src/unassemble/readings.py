@@ -13,6 +13,7 @@ from .boundaries import (
     recover_partial,
     recover_partial_elements,
     recover_without_boundary_terms,
+    unless_flow,
     with_boundary_edges,
     with_diagonals,
 )
@@ -142,7 +143,8 @@ class ScalarReadings:
         return recover_regions(matrix, every, self.placement, self.clock, self.options, self._exchanges)
 
     def _linear(self) -> PlanarMesh:
-        return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)
+        found = recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)
+        return found if self.options.noise is not None else unless_flow(self.matrix, found)
 
     def _plain(self, matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
         return recover_scalar(matrix, self.placement, self.clock, self.options, squared_lengths)

@@ -22,6 +22,7 @@ from ..planar.piece import left_by_map
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED, ROUNDED
 from ..topology import Piece
+from ..words import Reason
 
 
 def recover_without_boundary_terms(
@@ -49,6 +50,28 @@ def recover_without_boundary_terms(
         "say how much, and it was taken off"
     )
     return replace(found, warnings=(*found.warnings, note))
+
+
+def unless_flow(matrix: OperatorMatrix, found: PlanarMesh) -> PlanarMesh:
+    """A mesh of c L + D; ambiguous where D is what a convection leaves whose flow crosses the boundary.
+
+    Of a divergence-free flow, the symmetric part has sums in the rows of the boundary alone, which add up to zero. It
+    has entries on the edges of the boundary, too, and regular meshes have so few different entries that another mesh
+    may have them without a flow.
+    """
+    lacking, sums = matrix.incomplete_rows, matrix.row_sums
+    rim = np.zeros(matrix.n, dtype=bool)
+    rim[found.boundary] = True
+    size = float(np.abs(sums[lacking]).sum())
+    if not lacking.any() or (lacking & ~rim).any() or abs(float(sums[lacking].sum())) > ALIKE * size:
+        return found
+    return replace(found, verdict=found.verdict.beside(_FLOW))
+
+
+_FLOW = Reason(
+    "only rows of the boundary do not add up to zero, and their sums cancel, as those of a flow through it do: with "
+    "such a flow the mesh is another"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,14 @@ def recover_conforming(
             best = mesh
     if best is None:
         raise failure
+    # Few cells, or cells that are all alike, have hardly any entries that differ, and fit those of masses as well.
+    sign = np.sign(stored.diagonal[0]) if len(stored.edges) else 0.0
+    if sign and (sign * stored.diagonal > 0).all() and (sign * stored.entries > 0).all():
+        return replace(best, verdict=best.verdict.beside(_LIKE_MASS))
     return best
+
+
+_LIKE_MASS = Reason("all entries have one sign, as those of a mass matrix have, and this may be one on other cells")
 
 
 def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..certificate import Certificate, Findings, Terms, certify_masses
+from ..certificate import Certificate, Findings, Terms, Unique, certify_masses
 from ..clock import Clock
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
@@ -28,6 +28,7 @@ from ..recovery import Examined, Placed, PlanarMesh, finish
 from ..tolerances import ALIKE, CERTIFIED, SUMMED
 from ..topology import Topology
 from ..topology.surface import Together
+from ..words import Reason
 from .cells import TRIANGLE, evenly, guessed_from_sums, less, mass_matrix, told_without_stiffness, weights_at
 from .held import Plain, RowSums
 from .lengths import fit_areas
@@ -50,6 +51,8 @@ def recover_with_terms(
     # Else sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
     triangles = topology.pieces and not len(topology.bare_edges) and topology.multiplicity.all()
     if triangles:
+        if held.sign and (alone := _mass_alone(held, topology)) is not None:
+            return alone
         with clock("conformal"):
             laplacian = _is_laplacian(matrix, topology)
         if laplacian:
@@ -148,14 +151,15 @@ def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
     return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * (abs(scaled) @ np.abs(x))).all() else None
 
 
-def _mass_alone(held: RowSums, topology: Topology, triangles: NDArray, opposite: NDArray) -> PlanarMesh | None:
-    """Areas of triangles (m, 3) of a mass matrix; None where areas do not explain it.
+def _mass_alone(held: RowSums, topology: Topology) -> PlanarMesh | None:
+    """Areas of the triangles of a mass matrix; None where areas do not explain it.
 
     There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
     """
     matrix, sign = held.matrix, held.sign
     if not (sign * matrix.entries > 0).all():
         return None
+    triangles, opposite = _in_one(topology)
     areas = told_without_stiffness(matrix, triangles, opposite)
     if areas is None:
         return None
@@ -177,29 +181,39 @@ def _mass_alone(held: RowSums, topology: Topology, triangles: NDArray, opposite:
         reaction=1.0,
         areas=areas,
     )
-    said = "the areas are those times s, if the factor of the mass matrix is s"
+    said = ["the areas are those times s, if the factor of the mass matrix is s"]
+    equal = float(np.ptp(areas)) <= ALIKE * float(np.abs(areas).max())
+    if equal:
+        said.append(
+            "all areas are equal, and on triangles that are all alike c L + s M, with a negative c and the lumped mass "
+            "matrix M, may have the same entries"
+        )
 
     def examine(_: PlanarMesh, compared: Certificate) -> Examined:
         fits = f"the mass matrix of triangles with these areas is the given one to {compared.backward_error:.1e}"
         shapeless = (
             "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
         )
-        return Examined(Findings((f"{fits} (relative)", shapeless), compared.backward_error, unique="proved"))
+        return Examined(Findings((f"{fits} (relative)", shapeless), compared.backward_error, unique=unique))
 
+    unique: Unique = "searched" if equal else "proved"
     return finish(
         held.clock,
-        lambda: Placed(mesh, (*matrix.warnings, said)),
+        lambda: Placed(mesh, (*matrix.warnings, *said)),
         lambda _: certify_masses(matrix.edges, matrix.entries, matrix.diagonal, triangles, areas),
         examine,
     )
 
 
+def _in_one(topology: Topology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m, 3) triangles of all pieces, and the edges that face their corners."""
+    union = Together(topology.pieces)
+    return union.vertices[union.triangles], union.edge_rows[union.opposite]
+
+
 def with_consistent_mass(held: RowSums, topology: Topology, plain: Plain, clock: Clock) -> PlanarMesh | None:
-    """The mesh of c L + s M, or areas of s M; None where no areas come near the entries."""
-    matrix, union = held.matrix, Together(topology.pieces)
-    triangles, opposite = union.vertices[union.triangles], union.edge_rows[union.opposite]
-    if (found := _mass_alone(held, topology, triangles, opposite)) is not None:
-        return found
+    """The mesh of c L + s M; None where no areas come near the entries."""
+    matrix, (triangles, opposite) = held.matrix, _in_one(topology)
     # Row sums of at least their rounding; those that have lost digits that a certificate could notice weigh less.
     sums = np.maximum(np.abs(matrix.row_sums), held.rounding)
     if not sums.all():  # rows of zeros
@@ -225,4 +239,31 @@ def with_lumped_mass(held: RowSums, found: PlanarMesh) -> PlanarMesh:
         return found
     terms = Terms(held.matrix.diagonal, reaction, lumped=True)
     again = held.with_terms(found, terms, "c L + s M, M the lumped mass matrix,")
-    return again if again.certified else found
+    if not again.certified:
+        return found
+    return replace(again, verdict=again.verdict.beside(_LIKE_MASS)) if _all_alike(again) else again
+
+
+def _all_alike(mesh: PlanarMesh) -> bool:
+    """Whether all triangles are translated or turned by half a turn, and none of their sides has vanished.
+
+    With areas a of all triangles, consistent masses add s a / 12 for each triangle at an edge where lumped ones add
+    nothing: that is a change of the cotangents of three angles, which are those of other triangles, all alike as well.
+    """
+    triangles = mesh.triangles
+    if mesh.n_polygons or not len(triangles):
+        return False
+    z = mesh.points[triangles] @ [1, 1j]
+    sides = (np.roll(z, -1, axis=1) - z) ** 2  # by their squares, which do not know a direction
+    ratio = np.roll(sides, 1, axis=1) / sides
+    right = (np.abs(ratio.imag) <= ALIKE * np.abs(ratio)) & (ratio.real < 0)  # their entries vanish
+    size = np.abs(sides).max()
+    powers = [(sides / size) ** k for k in (1, 2, 3)]
+    same = all((np.abs(p.sum(axis=1) - p.sum(axis=1)[0]) <= ALIKE).all() for p in powers)
+    return bool(same and not right.any())
+
+
+_LIKE_MASS = Reason(
+    "all triangles are alike, and with a consistent mass matrix in place of the lumped one triangles of another shape "
+    "have the same entries"
+)
