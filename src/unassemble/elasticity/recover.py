@@ -16,14 +16,13 @@ from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, CERTIFIED
 from ..words import Reason
-from .doubts import guessed_directions, notes, unborne, unconfirmed
+from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
-from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, no_positions, verdict
+from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, WEAK_AND_UNKNOWN, hidden_elements, no_positions, verdict
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -73,8 +72,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
             bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
     status, reason = verdict(nodal, solution, error, found, numbering, rounding, bar)
     alone = status == "certified" and not found.certified
-    lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
-    if lone.any() and not cells:  # only elements can confirm them
+    lone = unchecked(nodal, solution, found) if status == "certified" else np.zeros(nodal.n, dtype=bool)
+    if lone.any() and not (cells or found.certified):  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))
     simplex = nodal.n <= nodal.dim + 1  # whose rows may all depend on one
     if alone and (simplex or not (determined(solution.points) & ~lone).any()):
@@ -96,6 +95,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     for against, why in (
         (loose.all(), NOTHING_CHECKED),
         (any(map(_flat, bodies)), Reason("the points lie in one line or plane, and no solid body does")),
+        (found.hidden > 0, hidden_elements(found.hidden)),
+        (alone and cells and _contrast(nodal) > 1 / ALIKE, WEAK_AND_UNKNOWN),
         ((shear <= ALIKE * bulk).any(), Reason("elements have no shear stiffness: any vectors that cancel are such")),
     ):
         if status == "certified" and against:
@@ -124,6 +125,12 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         poisson_ratio=None if ratio is None else poisson_ratio(ratio),
         lame=lame,
     )
+
+
+def _contrast(nodal: NodalMatrix) -> float:
+    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
+    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[nodal.node] > 0) & (nodal.size[nodal.indices] > 0)
+    return float((nodal.size[nodal.node[live]] / nodal.size[nodal.indices[live]]).max(initial=1.0))
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
