@@ -5,11 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from ..nodes.nodal import NodalMatrix, determined
+from ..nodes.nodal import NodalMatrix, determined, valid_pairs
 from ..nodes.numbering import Numbering
+from ..tolerances import ALIKE
 from ..words import count_of
 from .materials.cells import Cells
+from .nullspace.checked import checked
 from .nullspace.placing import Solution
 
 
@@ -37,6 +40,30 @@ def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.
     firm = determined(solution.firm_points)
     shown = firm | (found.shown | (nodal.row_of < 0)).all(axis=1)
     return np.asarray(solution.hanging & ~_held_together(found.among(shown), solution.component, firm))
+
+
+def unchecked(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
+    """(n,) nodes with coordinates that are in no cell which re-assembles, and that no other identities check.
+
+    So are nodes in the place of another, unless their own rows are whole: springs draw nodes together, and bodies in
+    contact have nodes upon each other that have rows of elements.
+    """
+    known = determined(solution.points)
+    outside = known.copy()
+    for cells in found.blocks.values() if found.certified else ():
+        outside[cells.ravel()] = False
+    if not outside.any():
+        return outside
+    twice = np.zeros(nodal.n, dtype=bool)
+    twice[known] = _coinciding(solution.points[known])
+    whole = valid_pairs(nodal).all(axis=(1, 2))
+    return outside & (~checked(nodal, solution) | twice & ~whole)
+
+
+def _coinciding(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) points in the place of another, as far as half of the digits tell; mean edges have length one."""
+    away, _ = cKDTree(points).query(points, k=2)
+    return np.asarray(away[:, 1] <= ALIKE)
 
 
 def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -17,14 +17,13 @@ from ..nodes.rounded import known_to
 from ..recovery import Body, Examined, Placed, Residual, finish
 from ..tolerances import ALIKE, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason
-from .doubts import guessed_directions, notes, unborne, unconfirmed
+from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
-from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, examined, no_positions
+from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, WEAK_AND_UNKNOWN, examined, hidden_elements, no_positions
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -74,8 +73,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
             bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
     sure, objections = examined(nodal, solution, error, found, numbering, rounding, bar)
     alone = not objections and not found.certified
-    lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
-    if lone.any() and not cells:  # only elements can confirm them
+    lone = unchecked(nodal, solution, found) if not objections else np.zeros(nodal.n, dtype=bool)
+    if lone.any() and not (cells or found.certified):  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))
     simplex = nodal.n <= nodal.dim + 1  # whose rows may all depend on one
     if alone and (simplex or not (determined(solution.points) & ~lone).any()):
@@ -99,6 +98,10 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         objections.append(NOTHING_CHECKED)
     if any(map(_flat, bodies)):
         objections.append(Reason("the points lie in one line or plane, and no solid body does"))
+    if found.hidden > 0:
+        objections.append(hidden_elements(found.hidden))
+    if alone and cells and _contrast(nodal) > 1 / ALIKE:
+        objections.append(WEAK_AND_UNKNOWN)
     if (shear <= ALIKE * bulk).any():
         objections.append(Reason("elements have no shear stiffness: any vectors that cancel are such"))
     guessed = guessed_directions(numbering, loose)
@@ -136,6 +139,12 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
 
     held = Residual(found.backward_error if found.certified else error)
     return finish(request.clock, place, lambda _: held, examine)
+
+
+def _contrast(nodal: NodalMatrix) -> float:
+    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
+    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[nodal.node] > 0) & (nodal.size[nodal.indices] > 0)
+    return float((nodal.size[nodal.node[live]] / nodal.size[nodal.indices[live]]).max(initial=1.0))
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:

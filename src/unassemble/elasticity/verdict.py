@@ -23,11 +23,21 @@ RESTS_ON_PLANES = Reason(
     advice=WITHOUT_SUPPORTS,
 )
 
+WEAK_AND_UNKNOWN = Reason(
+    "neighbouring nodes differ in stiffness by more than six digits, and no elements re-assemble that explain it"
+)
+
 
 def no_positions(why: object) -> str:
     """Why there are none, and what may be to blame where it was inferred which rows belong to one node."""
     blame = f"which rows belong to one node, and to which direction, was inferred: {GIVE_NUMBERING}"
     return sentences([f"no positions were found: {why}", blame])
+
+
+def hidden_elements(count: int) -> Reason:
+    """That rounding hides whether weak elements are there."""
+    weak = count_of(count, "element is", "elements are")
+    return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
 def examined(
@@ -52,6 +62,7 @@ def examined(
     if shown:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         sure = f"the matrix re-assembled on the {count} is the given one"
+        objections += [_soft(solution)] if error > _MAGNIFIED * _softest(solution) else []
     elif rounding and known:
         sure = holds + known.within(rounding)
         objections += known.objections(error, rounding, holds)

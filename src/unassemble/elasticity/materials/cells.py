@@ -17,7 +17,7 @@ from ...elements.candidates import Block, candidates
 from ...elements.cliques import Graph
 from ...elements.surface import tiles
 from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
-from ...tolerances import ALIKE, CERTIFIED
+from ...tolerances import CERTIFIED, LAST_DIGITS
 from .entries import Entries, Pairs
 from .fits import fits
 
@@ -33,6 +33,7 @@ class Cells:
     # largest difference between an entry and the re-assembled one, relative to the largest of its row
     backward_error: float = float("nan")
     shown: NDArray[np.bool_] | None = None  # (n, d) unknowns whose row has an entry that re-assembles and is not zero
+    hidden: int = 0  # cells so weak beside others of their nodes that rounding hides their material
 
     @property
     def certified(self) -> bool:
@@ -50,11 +51,14 @@ class Cells:
         return replace(self, blocks=blocks, lame=lame)
 
 
-def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
-    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
+def coupled(nodal: NodalMatrix, points: NDArray[np.float64], least: float = LAST_DIGITS) -> Graph:
+    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero.
+
+    Zero is what is no more than `least` of the rows of both.
+    """
     known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
     i, j = nodal.node, nodal.indices
-    live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live = np.abs(nodal.data).max(axis=(1, 2)) > least * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
     live |= lacking[i] | lacking[j]
     live &= known[i] & known[j]
     return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))
@@ -77,13 +81,16 @@ def recognise_cells(
     which fewer rows can tell.
     """
     graph, known = coupled(nodal, points), determined(points)
+    every = coupled(nodal, points, 0.0)  # weak cells between stiff ones may have less than the last digits
     ways = [Entries.of(nodal, known, likely, allowed) for likely in (surrounded(nodal, valid_pairs(nodal)), None)]
+    ways = ways if (ways[0].complete != ways[0].sure).any() else ways[:1]
     found = Cells()
-    for entries in ways if (ways[0].complete != ways[0].sure).any() else ways[:1]:
-        other = _recognised(points, graph, entries, ratio)
-        if other.certified:
-            return other
-        found = found if found.blocks else other
+    for couplings in (graph, every) if len(every.row) > len(graph.row) else (graph,):
+        for entries in ways:
+            other = _recognised(points, couplings, entries, ratio)
+            if other.certified:
+                return other
+            found = found if found.blocks else other
     return found
 
 
@@ -118,17 +125,19 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
     return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
 
 
-def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float, allowed: float) -> Cells | None:
+def _accepted(
+    blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float, hidden: int, allowed: float
+) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
     if not (misfit <= allowed and lame.any() and np.isfinite(lame).all()):
         return None
-    carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
+    carries = lame.any(axis=1)
     parts = np.split(carries, np.cumsum([len(one.cells) for one in blocks])[:-1])
     blocks = [replace(one, cells=one.cells[part]) for one, part in zip(blocks, parts, strict=True) if part.any()]
     mu = lame[carries, 1]
     if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit)
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit, hidden=hidden)

@@ -14,7 +14,7 @@ from ...elements.cliques import Graph
 from ...elements.kinds import Kind
 from ...elements.reference import Rule, elasticity
 from ...nodes.nodal import NodalMatrix, valid_pairs
-from ...tolerances import CERTIFIED
+from ...tolerances import CERTIFIED, LAST_DIGITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +57,11 @@ class Entries:
         return cls(nodal.n, i * nodal.n + j, nodal.data[use], told, size, complete, sure, allowed)
 
     @property
+    def nothing(self) -> float:
+        """Relative size up to which a value is zero: by the last digits, unless entries are known to fewer."""
+        return LAST_DIGITS if self.allowed <= CERTIFIED else self.allowed
+
+    @property
     def largest(self) -> float:
         """Largest of the values relative to their row."""
         return float(np.abs(self.value / self.size[:, None, None]).max(initial=0))
@@ -81,7 +86,7 @@ class Entries:
         quadratic triangle, and the corner facing it; or two nodes on rollers. Its entries with others of that cell
         tell, and what both ends of such an entry couple to are the nodes of the cell.
         """
-        outside = np.abs(self.value).max(axis=(1, 2)) > CERTIFIED * self.size
+        outside = np.abs(self.value).max(axis=(1, 2)) > self.nothing * self.size
         for own in pairs:
             outside[own.place[own.there]] = False
         i, j = np.divmod(self.key, self.n)
@@ -160,6 +165,15 @@ class Model:
             turned = own.flip[batch]
             unit[:, turned] = unit[:, turned].swapaxes(-1, -2)
             yield batch, unit * entries.told[own.place[batch]] if partial else unit
+
+    def most_added(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) the most that each cell with coefficients (m, 2) adds to an entry, relative to the size of its rows."""
+        most = np.zeros(len(self.cells))
+        for batch, unit in self.contributions(pairs, entries):
+            part = np.abs(np.einsum("ms,smpcb->mpcb", lame[batch], unit)).max(axis=(2, 3))
+            relative = np.where(pairs.there[batch], part / entries.size[pairs.place[batch]], 0.0)
+            most[batch] = relative.max(axis=1)
+        return most
 
     def assembled(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
         """(e, d, d) entries of cells with coefficients (m, 2)."""

@@ -13,17 +13,22 @@ from numpy.typing import NDArray
 
 from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
+from ...elements.surface import contested
 from ...linalg import threads
-from ...tolerances import LITTLE, ROUNDED, SINGULAR
+from ...tolerances import ALIKE, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
 from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
 _LARGEST = 50_000_000  # numbers in a least-squares problem
+_AS_WELL = 10.0  # by which factor fewer cells may explain the entries worse than all candidates
+_EXPLAINED = 10 * LAST_DIGITS  # what least squares leave of entries that cells explain, relative to their row
+_FOUR_DIGITS = 1e4  # by which factor what a cell adds to an entry exceeds what is left of entries, at least
 
 
-# Blocks, lambda and mu (m, 2) of their cells, one after the other, zero for candidates that carry no material; and the
-# largest difference between an entry and the re-assembled one, relative to its row.
-Fit = tuple[Sequence[Block], NDArray[np.float64], float]
+# Blocks, lambda and mu (m, 2) of their cells, one after the other, zero for candidates that carry no material; the
+# largest difference between an entry and the re-assembled one, relative to its row; and how many cells are so weak that
+# this difference hides their material.
+Fit = tuple[Sequence[Block], NDArray[np.float64], float, int]
 
 
 def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries, ratio: float | None) -> Iterator[Fit]:
@@ -35,23 +40,24 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
     simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
     beside = [Pairs.of(one.cells, entries) for one in simple]
     rich = [one for one in blocks if not one.kind.linear_simplex]
-    lame = [np.empty((0, 2))]
+    lame, hidden = [np.empty((0, 2))], 0
     for one in rich:
         rule = _likely_rule(points, one, entries, beside)
         if rule is None:
             return
-        found, entries = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
+        found, entries, unsure = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
         lame.append(found)
+        hidden += unsure
     if not simple:
-        yield rich, np.vstack(lame), entries.largest
+        yield rich, np.vstack(lame), entries.largest, hidden
     for model in simple:
         if ratio is not None:
             coefficients, rest = _one_material(model, entries, ratio)
-            yield blocks, np.vstack([coefficients, *lame]), rest.largest
+            yield blocks, np.vstack([coefficients, *lame]), rest.largest, hidden
         pairs = model.kind.nodes * (model.kind.nodes - 1)
         if len(model.cells) * pairs * model.kind.dim**2 <= _LARGEST:
-            coefficients, rest = _least_squares(model, entries)
-            yield blocks, np.vstack([coefficients, *lame]), rest.largest
+            coefficients, rest, unsure = _fewest(model, entries)
+            yield blocks, np.vstack([coefficients, *lame]), rest.largest, hidden + unsure
 
 
 def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequence[Pairs]) -> Rule | None:
@@ -64,15 +70,19 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
     few = entries.at(np.unique(pairs.place[some][own[some]]))
     best, chosen = np.inf, None
     for rule in rules(block.kind) if len(few.key) else ():
-        found, rest = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
+        found, rest, _ = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
         # Where geometry is affine they all fit.
         if np.isfinite(found).all() and rest.largest <= min(entries.allowed, LITTLE * best):
             best, chosen = rest.largest, rule
     return chosen
 
 
-def cell_by_cell(model: Model, entries: Entries, beside: Sequence[Pairs] = ()) -> tuple[NDArray[np.float64], Entries]:
+def cell_by_cell(
+    model: Model, entries: Entries, beside: Sequence[Pairs] = ()
+) -> tuple[NDArray[np.float64], Entries, int]:
     """(m, 2) coefficients of cells from the entries that no other contributes to, and what they leave of all entries.
+
+    The third result counts weak cells of which what is left of stronger ones hides the material.
 
     Two nodes on opposite sides of a cell share that cell only, so that their entries tell its coefficients. A cell next
     to a support may lack such entries until its neighbours' contributions are taken away. Cells that stay open have
@@ -84,14 +94,18 @@ def cell_by_cell(model: Model, entries: Entries, beside: Sequence[Pairs] = ()) -
     todo = np.flatnonzero(pairs.seen)
     lame[todo] = np.nan
     count = claims((pairs, *beside), entries)
+    whole = count == 1  # entries of which nothing is taken away before they tell a cell
+    by = np.zeros(pairs.there.shape, dtype=bool)
     while True:  # cells next to supports may wait for their neighbours
         alone, before = count == 1, len(todo)
         for batch, unit in model.contributions(pairs, entries, todo):
             some = todo[batch]
             place, there = pairs.place[some], pairs.there[some]
             target = rest.reshape(entries.value.shape)[place]
-            found = _of_own_entries(unit, target, there & alone[place], entries.size[place])
+            own = there & alone[place]
+            found = _of_own_entries(unit, target, own, entries.size[place])
             told = np.isfinite(found[:, 0])
+            by[some[told]] = own[told]
             lame[some[told]] = found[told]
             place, there = place[told], there[told]
             sums = np.einsum("sm,smpcb->mpcb", found[told].T, unit[:, told])
@@ -100,7 +114,16 @@ def cell_by_cell(model: Model, entries: Entries, beside: Sequence[Pairs] = ()) -
         todo = todo[np.isnan(lame[todo, 0])]
         if not 0 < len(todo) < before:
             break
-    return lame, replace(entries, value=rest.reshape(entries.value.shape))
+    left = np.abs(rest.reshape(entries.value.shape)).max(axis=(1, 2)) / entries.size
+    sure = (by & whole[pairs.place]).any(axis=1)
+    left = np.where(by, left[pairs.place], 0).max(axis=1)
+    most = model.most_added(pairs, entries, lame)
+    nothing = ~sure & (most < _EXPLAINED)  # what is left of other cells
+    most[nothing], lame[nothing] = 0, 0
+    left = np.where(sure, left, np.maximum(left, LAST_DIGITS))
+    weak = (most > 0) & (most < np.minimum(ALIKE, _FOUR_DIGITS * left))
+    hidden = int(weak.sum()) if entries.allowed <= CERTIFIED else 0
+    return lame, replace(entries, value=rest.reshape(entries.value.shape)), hidden
 
 
 def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size: NDArray) -> NDArray[np.float64]:
@@ -129,6 +152,53 @@ def _one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray
     each = (full * entries.value).sum(axis=(1, 2))[weighty] / square[weighty]
     mu = float(np.median(each)) if len(each) else 0.0
     return mu * unit, replace(entries, value=entries.value - mu * full)
+
+
+def _fewest(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entries, int]:
+    """(m, 2) coefficients of as few cells as explain the entries as well as all candidates do, and what they leave.
+
+    Candidates that carry no material come out as weak cells, by rounding. A weak cell of the body is told from these
+    by the entries, each relative to its own row: without it they are not explained. The third result counts the cells
+    of which rounding hides whether they are there, or of what material.
+    """
+    lame, rest = _least_squares(model, entries)
+    most = model.most_added(Pairs.of(model.cells, entries), entries, lame)
+    bound = max(_AS_WELL * rest.largest, _EXPLAINED)
+    kept = np.ones(len(most), dtype=bool)
+    for least in ALIKE * LITTLE ** np.arange(10):
+        strong = most > least
+        if strong.all() or not strong.any() or least < rest.largest:
+            break
+        fewer = replace(model, cells=model.cells[strong])
+        found, left = _least_squares(fewer, entries)
+        if left.largest <= bound:
+            kept, lame, rest = strong, np.zeros_like(lame), left
+            lame[kept] = found
+            break
+    if entries.allowed > CERTIFIED:  # of entries that are rounded, holes and weak cells look the same
+        return lame, rest, 0
+    weak = kept & _uncertain(model, entries, lame, max(rest.largest, LAST_DIGITS))
+    gone = ~kept & (most > _EXPLAINED)
+    gone[gone] = ~contested(model.kind.base, np.vstack([model.cells[gone], model.cells[kept]]))[: gone.sum()]
+    return lame, rest, int((weak | gone).sum())
+
+
+def _uncertain(model: Model, entries: Entries, lame: NDArray, noise: float) -> NDArray[np.bool_]:
+    """(m,) weak cells whose coefficients (m, 2) errors of the entries change by more than the fourth digit.
+
+    Errors are drawn at random, as large as the `noise`, relative to their row. Several weak cells together may be free
+    to change where each by itself is not, so that only a fit tells.
+    """
+    size = np.abs(lame).max(axis=1)
+    weak = (size > 0) & (size < ALIKE * size.max(initial=0))
+    if not weak.any():
+        return weak
+    drawn = np.random.default_rng(0).standard_normal(entries.value.shape) * entries.told
+    errors = replace(entries, value=noise * drawn * entries.size[:, None, None])
+    carries = size > 0
+    change = np.zeros_like(lame)
+    change[carries] = _least_squares(replace(model, cells=model.cells[carries]), errors)[0]
+    return np.asarray(weak & (_FOUR_DIGITS * np.abs(change).max(axis=1) > size))
 
 
 def _least_squares(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entries]:
