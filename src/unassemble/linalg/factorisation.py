@@ -53,7 +53,7 @@ def factorisation(matrix: UpperTriangle, *, definite: bool = False) -> Factorisa
         return _Dense(matrix, definite=definite)
     if backend() == "pardiso":
         return pardiso.PardisoFactorisation(matrix, definite=definite)
-    return _SuperLU(matrix)
+    return _SuperLU(matrix, definite=definite)
 
 
 class _Dense:
@@ -93,17 +93,21 @@ class _Dense:
 class _SuperLU:
     """SuperLU, which orders and factorises in one go: nothing is kept between factorisations."""
 
-    def __init__(self, matrix: UpperTriangle):
-        self._dtype = np.complex128 if np.iscomplexobj(matrix.data) else np.float64
+    def __init__(self, matrix: UpperTriangle, *, definite: bool):
+        self._dtype, self._definite = np.complex128 if np.iscomplexobj(matrix.data) else np.float64, definite
 
     def factorise(self, matrix: UpperTriangle) -> None:
         _require_finite(matrix)
         # Minimum degree on A + A' with diagonal pivots preferred: SuperLU users' guide, "symmetric mode".
         options = {"SymmetricMode": True}
         try:
-            self._lu = splu(matrix.full(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options=options)
+            threshold = 0.0 if self._definite else 0.001  # pivots of definite matrices stay on the diagonal
+            self._lu = splu(matrix.full(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options=options)
         except RuntimeError as error:
             raise SolverError(f"SuperLU could not go on with a matrix of order {matrix.n}: {error}") from error
+        if self._definite and not (self._lu.U.diagonal().real > 0).all():
+            self.release()
+            raise SolverError(f"a matrix of order {matrix.n} is not positive definite: a pivot is not positive")
 
     def solve(self, rhs: NDArray) -> NDArray:
         return self._lu.solve(np.asfortranarray(rhs, dtype=self._dtype))

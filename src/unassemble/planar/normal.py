@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
-from ..tolerances import LAST_DIGITS
+from ..tolerances import AGREED, LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import weight_gradient
 
@@ -41,17 +41,25 @@ class WeightJacobian(Jacobian):
         super().__init__(sp.bsr_array((blocks, vertices, start), shape=(e, 2 * len(z))))
 
 
+MOST_CORRECTIONS = 30
+"""Steps of conjugate gradients; two are enough unless the factor has no digit left."""
+
+
 class NormalEquations:
     """Factorised J'J with some vertices held fixed, which pins the freedoms of a similarity, or of several.
 
     `pins` (k,): vertices that stay where they are; the farther apart the better.
+
+    J'J has the square of the condition of J. Of pieces hundreds of times as long as wide its factor has next to no
+    digit left, and which displacement comes out depends on the order in which sums are formed. `corrected`, the factor
+    is the preconditioner of conjugate gradients on the least-squares problem itself, whose residual is formed by J.
     """
 
-    def __init__(self, jacobian: Jacobian, pins: NDArray):
+    def __init__(self, jacobian: Jacobian, pins: NDArray, *, corrected: bool = False):
+        self._corrected = corrected
         self._free = np.ones(jacobian.n, dtype=bool)
         self._free[pins] = False
-        matrix = _upper_blocks(jacobian.matrix, self._free)
-        self._factor = _factorised(matrix)
+        self._factor = self._factorised(_upper_blocks(jacobian.matrix, self._free))
 
     def renew(self, jacobian: Jacobian) -> None:
         """Factorise anew for other positions; that the pattern was analysed still counts."""
@@ -60,7 +68,19 @@ class NormalEquations:
             self._factor.factorise(matrix)
         except SolverError:
             self._factor.release()
-            self._factor = _factorised(matrix)
+            self._factor = self._factorised(matrix)
+
+    def _factorised(self, matrix: UpperTriangle) -> Factorisation:
+        """Cholesky; where slivers spread the entries so far that a pivot comes out negative, with pivoting.
+
+        A preconditioner has to be positive: as much is added to the diagonal as makes it so.
+        """
+        for share in (0.0, LAST_DIGITS, 10 * LAST_DIGITS, ROUNDED) if self._corrected else (0.0,):
+            try:
+                return _factor(_heavier(matrix, share), definite=True)
+            except SolverError:
+                continue
+        return _factor(matrix, definite=False)
 
     def solve(self, rhs: NDArray) -> NDArray:
         """Least displacement equation J'J d = rhs, both (n,) or (n, k) complex."""
@@ -73,8 +93,43 @@ class NormalEquations:
     def fitted(self, jacobian: Jacobian, changes: NDArray) -> NDArray:
         """Displacements d, (n,) or (n, k), that explain changes r, (e,) or (e, k), of weights best: least |J d - r|."""
         if changes.ndim == 1:
-            return self.solve(jacobian.transpose(changes))
-        return self.solve(np.column_stack([jacobian.transpose(change) for change in changes.T]))
+            return self.fitted(jacobian, changes[:, None])[:, 0]
+        result = self.solve(self._gradients(jacobian, changes))
+        return self._conjugate(jacobian, changes, result) if self._corrected else result
+
+    def _gradients(self, jacobian: Jacobian, changes: NDArray) -> NDArray:
+        """J' r of each column."""
+        return np.column_stack([jacobian.transpose(change) for change in changes.T])
+
+    def _conjugate(self, jacobian: Jacobian, changes: NDArray, start: NDArray) -> NDArray:
+        """Least |J d - r| by conjugate gradients from a start d (n, k), each column by itself, the factor preconditioning.
+
+        A. Bjorck, Numerical Methods for Least Squares Problems (1996), section 7.4. A column is done where what is to
+        come changes J d by next to nothing of the residual; the best d on the way is kept.
+        """
+        d, best = start.copy(), start.copy()
+        left = changes - jacobian.forward(d)
+        least = np.linalg.norm(left, axis=0)
+        along, before = np.zeros_like(d), np.ones(d.shape[1])
+        for k in range(MOST_CORRECTIONS):
+            gradient = self._gradients(jacobian, left)
+            gradient[~self._free] = 0
+            solved = self.solve(gradient)
+            size = (gradient.conj() * solved).real.sum(axis=0)  # about the square of what J d still changes by
+            active = size > (AGREED * least) ** 2
+            if not active.any():
+                break
+            along = solved + along * (np.where(active, size / before, 0.0) if k else 0.0)
+            before = np.where(active, size, 1.0)
+            step = jacobian.forward(along)
+            square = (step * step).sum(axis=0)
+            length = np.where(active & (square > 0), size / np.where(square > 0, square, 1.0), 0.0)
+            d += length * along
+            left -= length * step
+            norm = np.linalg.norm(left, axis=0)
+            better = norm < least
+            best[:, better], least[better] = d[:, better], norm[better]
+        return best
 
     def release(self) -> None:
         """Give the memory of the factor back."""
@@ -107,15 +162,25 @@ class GaussNewton:
         return move - np.multiply.outer(self._response, log_scale)
 
 
-def _factorised(matrix: UpperTriangle) -> Factorisation:
-    """Cholesky; where slivers spread the entries so far that a pivot comes out negative, with pivoting."""
+def _factor(matrix: UpperTriangle, *, definite: bool) -> Factorisation:
+    """Raises SolverError where a pivot is zero, or not positive although it should be."""
+    factor = factorisation(matrix, definite=definite)
     try:
-        factor = factorisation(matrix, definite=True)
         factor.factorise(matrix)
     except SolverError:
-        factor = factorisation(matrix)
-        factor.factorise(matrix)
+        factor.release()
+        raise
     return factor
+
+
+def _heavier(matrix: UpperTriangle, share: float) -> UpperTriangle:
+    """With a share of each row's diagonal entry added to it."""
+    if not share:
+        return matrix
+    data, first = matrix.data.copy(), matrix.indptr[:-1]  # the blocks of the diagonal
+    for k in range(matrix.block):
+        data[first, k, k] *= 1 + share
+    return matrix.with_data(data)
 
 
 def _upper_blocks(jacobian: sp.bsr_array, free: NDArray) -> UpperTriangle:

@@ -40,7 +40,9 @@ class PolishOptions:
     # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
     most_vertices: int = 1_500_000  # the factor of larger meshes takes more memory than most machines have
-    careful: bool = False  # a factorisation for each step, which is cut short before a triangle turns over
+    # a factorisation for each step, solved until rounding of the normal equations is gone, and cut short before a
+    # triangle turns over
+    careful: bool = False
 
 
 SHORT = PolishOptions(max_steps=8, max_factorisations=3)
@@ -190,7 +192,7 @@ def polish(
             if equations is not None:
                 equations.renew(jacobian)
             else:
-                equations = NormalEquations(jacobian, pins)
+                equations = NormalEquations(jacobian, pins, corrected=options.careful)
             system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
             factorisations += 1
         move = system(jacobian, fit.misfit)

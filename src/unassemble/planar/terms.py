@@ -49,7 +49,7 @@ def lacking_term(
     terms = terms[:, :count] / spread[:, None]
     try:
         jacobian = WeightJacobian(piece, z, spread)
-        equations = NormalEquations(jacobian, distant_pair(z))
+        equations = NormalEquations(jacobian, distant_pair(z), corrected=True)
         both = np.column_stack([weights / scale / spread - fitted, terms, fitted])
         both -= jacobian.forward(equations.fitted(jacobian, both))  # what displacements cannot explain of these
         equations.release()

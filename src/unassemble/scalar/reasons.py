@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..cells import Alternative
 from ..certificate import Certificate, without_spare_equations
 from ..planar.terms import COEFFICIENT, MASS, Term
-from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, PLACED
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, LITTLE, MAGNIFIED, PLACED
 from ..words import Reason, count_of, words_of
 from .noise import Noise
 from .solving import Solved, leaders
@@ -45,7 +45,8 @@ def _doubts(f: Finished, apart: str) -> Iterator[tuple[str, str]]:
     if apart:
         yield f"the matrix is given back to {error:.1e} (relative), but {apart}", ""
     if noise := f.near.by_noise:
-        allowed = max(PLACED, noise.sigma / float(np.abs(f.solved.scales).min()))
+        # The last step of a polish that came to no end is but a guess of how far off points are.
+        allowed = max(PLACED, LITTLE * noise.sigma / float(np.abs(f.solved.scales).min()))
         if f.evidence.term:
             yield from _lacking(f, f.evidence.term)
     if not doubt <= allowed:
