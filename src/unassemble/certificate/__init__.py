@@ -9,6 +9,11 @@ from .masses import certify_masses as certify_masses
 from .noise import chi_square_verdict as chi_square_verdict
 from .planar import certify as certify, certify_mesh as certify_mesh
 from .spare import without_spare_equations as without_spare_equations
+from .structures import (
+    StructureCheck as StructureCheck,
+    check_bars as check_bars,
+    check_structure as check_structure,
+)
 from .verdict import (
     UNJUDGED as UNJUDGED,
     Findings as Findings,

@@ -8,13 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..certificate import Findings
+from ..certificate import Findings, StructureCheck
 from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.numbering import Rows
 from ..nodes.rounded import Known, Rounding, known_to
-from ..recovery import Examined, Placed as Finished, Residual, Structure, finish
+from ..recovery import Examined, Placed as Finished, Structure, finish
 from ..tolerances import CERTIFIED, ROUNDED
-from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, words_of
 from .placed import Placed
 
 _LOADED = (
@@ -29,12 +29,11 @@ class HeldStructure:
     """Positions held against the matrix."""
 
     error: float  # the largest misfit
+    check: Callable[[NDArray[np.float64]], StructureCheck]  # of points as they are written, by formulas of its own
     misfits: NDArray[np.float64]  # (k,), with their signs
     again: Callable[[sp.csr_array], tuple[NDArray, NDArray]]  # points and misfits of a matrix rounded otherwise
     rounding: Rounding | None
-    said: tuple[str, str]  # what holds, and what of it does not
-    rows: NDArray[np.bool_]  # (N,) rows that say so
-    unknowns: NDArray[np.bool_]  # (N,) that these touch
+    said: tuple[str, str]  # what holds, and what of it does not, by an {error}
 
     def known(self, found: Placed, *, sized: bool) -> Known:
         """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
@@ -43,9 +42,10 @@ class HeldStructure:
             return Known(float(self.error * np.sqrt(loosest.rows) / loosest.gap))
         return known_to(found.points, found.component, self.misfits, self.rounding, self.again, sized=sized)
 
-    def objections(self, found: Placed, known: Known) -> Iterator[Reason]:
+    def objections(self, found: Placed, known: Known, check: StructureCheck) -> Iterator[Reason]:
         """What speaks against the positions."""
-        yield from known.objections(self.error, self.rounding, self.said[1])
+        error = max(self.error, check.backward_error)
+        yield from known.objections(error, self.rounding, self.said[1].format(error=error) + _most_in(check))
         if found.loaded:
             yield Reason(_LOADED, advice=_WITHOUT_LOADS)
         if found.unnoticed.any():
@@ -55,11 +55,20 @@ class HeldStructure:
             )
             yield Reason(unseen, advice=WITHOUT_SUPPORTS)
 
-    def fits(self, known: Known) -> str:
+    def fits(self, known: Known, check: StructureCheck) -> str:
         """What holds, how far it determines positions, and which rows say so."""
         digits = known.within(self.rounding)
-        share = f"{self.rows.mean():.0%} of the rows say so, of {self.unknowns.mean():.0%} of the unknowns"
+        share = f"{check.share:.0%} of the rows say so, of {check.unknowns.mean():.0%} of the unknowns"
         return f"{self.said[0]}{digits}: {share}"
+
+
+def _most_in(check: StructureCheck) -> str:
+    """Which rows the certificate does not explain, in words."""
+    worst = check.worst_rows[:3]
+    if not len(worst):
+        return ""
+    more = ", ..." if len(check.unexplained) > len(worst) else ""
+    return f", most in {'row' if len(worst) == 1 else 'rows'} {words_of(worst.tolist())}{more}"
 
 
 def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
@@ -88,18 +97,15 @@ def answer(
     """
     with request.clock("certify"):
         known = held.known(found, sized=sized)
-        objections = list(held.objections(found, known))
-        if not objections and (doubts := doubt()) is not None:
-            objections.append(doubts)
+        objections = []
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
     if 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
         objections.append(Reason("most nodes that are coupled are in one place", advice=GIVE_NUMBERING))
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
-    fits = held.fits(known)
 
     def place() -> Finished[Structure]:
         moved = anchored(request, rows, found.points, found.component, edge, sized=sized, free=free)
-        objections.extend(moved.objections(fits))
+        objections.extend(moved.objections(held.said[0]))
         structure = Structure(
             scale=np.full(len(moved.factor), np.nan),
             position_error=known.error if held.rounding and known.explained else None,
@@ -108,8 +114,12 @@ def answer(
         )
         return Finished(structure, (*request.matrix.warnings, *found.notes, *notes, *moved.notes))
 
-    def examine(_: Structure, compared: Residual) -> Examined:
+    def examine(_: Structure, check: StructureCheck) -> Examined:
+        against = [*held.objections(found, known, check), *objections]
+        if not against and (doubts := doubt()) is not None:
+            against.append(doubts)
         allowed = np.inf if held.rounding else CERTIFIED
-        return Examined(Findings((fits,), compared.backward_error, tuple(objections), allowed=allowed))
+        fits = held.fits(known, check)
+        return Examined(Findings((fits,), check.backward_error, tuple(against), allowed=allowed))
 
-    return finish(request.clock, place, lambda _: Residual(held.error), examine)
+    return finish(request.clock, place, lambda mesh: held.check(mesh.points), examine)

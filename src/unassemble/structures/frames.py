@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..certificate import StructureCheck, check_structure
 from ..linalg import blas_threads
 from ..nodes.anchoring import Request
 from ..nodes.rounded import Rounding, with_exact_sums
@@ -70,9 +71,23 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     used = (used | np.isin(node, ends) & ~np.isin(node, other)) & ~np.isin(node, found.spoiled)
     error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
     blocks = f", {count_of(len(ends), 'block is that', 'blocks are those')} of straight members" if len(ends) else ""
-    left = f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
+    left = "rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
     said = f"rigid rotations of the nodes cause no forces{blocks}", left
-    held = HeldStructure(error, force, again, rounding, said, used, abs(whole[used]).sum(axis=0) > 0)
+
+    def check(points: NDArray[np.float64]) -> StructureCheck:
+        return check_structure(
+            request.matrix.csr(),
+            node,
+            numbering.direction_of_row,
+            points,
+            layout.displacements,
+            layout.rotations,
+            members=ends,
+            allowed=max(CERTIFIED, spread),
+            excused=found.spoiled,
+        )
+
+    held = HeldStructure(error, check, force, again, rounding, said)
     notes = [said_of(found.spoiled)] if len(found.spoiled) else []
     found = replace(found, points=np.pad(found.points, ((0, 0), (0, layout.space - layout.dim))))
     fields: dict[str, Any] = {}

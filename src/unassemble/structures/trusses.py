@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import SAMPLE
+from ..certificate import StructureCheck, check_bars
 from ..errors import GeometryError
 from ..nodes.anchoring import Request
 from ..nodes.constants import row_sizes
@@ -110,13 +111,18 @@ def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: R
     with request.clock("solve"):
         found = _place_joints(bars, nodal.n, allowed)
     misfits, loose = _misfits(nodal, found.points), found.component < 0
-    error, rows = float(np.abs(misfits).max(initial=0.0)), ~loose[numbering.node_of_row]
+    error = float(np.abs(misfits).max(initial=0.0))
     said = (
         "bars between the nodes re-assemble to the matrix",
-        f"blocks are off those of bars by {error:.1e} of a row's largest",
+        "blocks are off those of bars by {error:.1e} of a row's largest",
     )
     lines = bars.ends[~loose[bars.ends].any(axis=1)]
-    held = HeldStructure(error, misfits, again, rounding, said, rows, rows)
+    node, direction = numbering.node_of_row, numbering.direction_of_row
+
+    def check(points: NDArray[np.float64]) -> StructureCheck:
+        return check_bars(request.matrix.csr(), node, direction, points, allowed=allowed)
+
+    held = HeldStructure(error, check, misfits, again, rounding, said)
     free = "the sign of the scale is free: the point reflection of a truss has the same matrix"
     notes = about_loose(loose, "the directions of all bars leave them room")
     return answer(

@@ -1,0 +1,315 @@
+"""The certificate of a structure: its matrix held against the coordinates, as they are written.
+
+Whatever the elements are, a rigid motion of the whole structure costs nothing. So each row of the matrix that lacks
+nothing annihilates the translations, and the rotations about each axis through the row's own node: displacements
+w x (x_j - x_i) and angles w. Forces are relative to the terms of their own row, without signs, so that stiff rows hide
+nothing in soft ones. Rows next to supports lack what was eliminated; it shows by translations, which their rows no
+longer annihilate. Springs between rotations and the ground, as programs add them against drilling, leave a symmetric
+matrix of moments at a node.
+
+What is said to be a straight member is held against the stiffness of one between its two points, set up in axes of its
+own (W. McGuire, R. H. Gallagher, R. D. Ziemian, Matrix Structural Analysis, 2nd ed., 2000, section 4.5) with the four
+numbers of its section taken from the block itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..tolerances import LAST_DIGITS
+
+_WORST = 10  # rows to name
+_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+
+
+@dataclass(frozen=True, eq=False)
+class StructureCheck:
+    """What the matrix of a structure says of coordinates."""
+
+    backward_error: float  # largest force, or misfit of a member, relative to its row or block; infinite if none counts
+    rows: NDArray[np.bool_]  # (N,) rows that say so
+    unknowns: NDArray[np.bool_]  # (N,) that these touch
+    unexplained: NDArray[np.int64]  # rows that lack nothing and yet do not annihilate a rotation, the worst first
+
+    @property
+    def share(self) -> float:
+        """Share of all rows that say so."""
+        return float(self.rows.mean())
+
+    @property
+    def worst_rows(self) -> NDArray[np.int64]:
+        """A few of the rows that are not explained."""
+        return self.unexplained[:_WORST]
+
+    def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """No pairs of rows: single entries of a structure are not told apart."""
+        return np.empty((0, 2), np.int64), np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Forces:
+    """Forces under unit rotations about axes through each row's own node, and which of them have to vanish."""
+
+    force: NDArray[np.float64]  # (N, axes)
+    size: NDArray[np.float64]  # (N,) of the terms that make forces up, about all axes together
+    due: NDArray[np.bool_]  # (N, axes) where the row lacks nothing that the rotation needs
+
+
+def check_structure(
+    matrix: sp.csr_array,
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+    points: NDArray[np.float64],
+    displacements: tuple[int, ...],
+    rotations: tuple[int, ...],
+    *,
+    members: NDArray[np.int64],
+    allowed: float,
+    excused: NDArray[np.int64] | None = None,
+) -> StructureCheck:
+    """Hold a symmetric matrix (N, N) against points (n, 2) or (n, 3), NaN where a node has none.
+
+    Directions count the axes of `displacements` first, then those of `rotations`; rows of direction -1 do not count.
+    `members` (m, 2) are pairs of nodes that are joined by straight members and nothing else. Up to what is `allowed`
+    forces vanish; nodes that are `excused` (k,) are known to contradict the others, and say nothing.
+    """
+    x = np.zeros((len(points), 3))
+    x[:, : points.shape[1]] = points
+    matrix = _without_rounding(matrix)
+    forces = _forces(matrix, node_of_row, direction_of_row, x, displacements, rotations, allowed)
+    others = np.isin(node_of_row, np.empty(0, np.int64) if excused is None else excused)
+    relative = np.abs(forces.force) / np.where(forces.size > 0, forces.size, 1.0)[:, None]
+    wrong = forces.due & ~(relative <= allowed) & ~others[:, None]
+    ground = _springs_to_ground(forces, node_of_row, direction_of_row, len(displacements), len(rotations), allowed)
+    off = np.where(wrong & ~ground, relative, 0.0).max(axis=1, initial=0.0)
+    order = np.argsort(-off, kind="stable")
+    unexplained = order[: np.count_nonzero(off)]
+    counts = forces.due.any(axis=1) & ~wrong.any(axis=1) & ~others
+    misfit = np.empty(0)
+    if len(members) and rotations:
+        misfit = _members(matrix, node_of_row, direction_of_row, x, displacements, rotations, members)
+        counts |= _only_members(matrix, node_of_row, members) & ~others
+    said = np.where(forces.due & ~(wrong & ground) & ~others[:, None], relative, 0.0).max(initial=0.0)
+    error = max(float(said), float(misfit.max(initial=0.0))) if counts.any() else float("inf")
+    touched = np.asarray(abs(matrix[np.flatnonzero(counts)]).sum(axis=0)).ravel() > 0
+    return StructureCheck(error, counts, touched, unexplained)
+
+
+def check_bars(
+    matrix: sp.csr_array,
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+    points: NDArray[np.float64],
+    *,
+    allowed: float,
+) -> StructureCheck:
+    """Hold the matrix (N, N) of a truss against points (n, d), NaN where a node has none.
+
+    The block of two nodes is that of a bar between them, - k e e^T, whose stiffness k is taken from the block itself.
+    What is left of an entry is relative to the largest entry that couples its node to another.
+    """
+    n, d = points.shape
+    entry = matrix.tocoo()
+    known = _determined(points)
+    i, j = node_of_row[entry.row], node_of_row[entry.col]
+    a, b = direction_of_row[entry.row], direction_of_row[entry.col]
+    off = (i != j) & known[i] & known[j] & (a >= 0) & (b >= 0)
+    row, i, j, a, b, value = entry.row[off], i[off], j[off], a[off], b[off], entry.data[off]
+    along = points[i] - points[j]
+    length = np.linalg.norm(along, axis=1)
+    counts = known[node_of_row]
+    touched = np.asarray(abs(matrix[np.flatnonzero(counts)]).sum(axis=0)).ravel() > 0
+    if (length == 0).any():  # a bar without length has no direction
+        return StructureCheck(float("inf"), counts, touched, np.unique(row[length == 0]))
+    e = along / length[:, None] if d else along
+    bar = np.take_along_axis(e, a[:, None], axis=1)[:, 0] * np.take_along_axis(e, b[:, None], axis=1)[:, 0]
+    _, pair = np.unique(i * n + j, return_inverse=True)
+    weight = np.bincount(pair, bar * bar)
+    force = np.bincount(pair, value * bar) / np.where(weight > 0, weight, 1.0)
+    size = np.zeros(n)
+    np.maximum.at(size, i, np.abs(value))
+    left = np.abs(value - force[pair] * bar) / np.where(size[i] > 0, size[i], 1.0)
+    worst = np.zeros(len(node_of_row))
+    np.maximum.at(worst, row, left)
+    order = np.argsort(-worst, kind="stable")
+    unexplained = order[: np.count_nonzero(worst > allowed)]
+    return StructureCheck(float(worst.max(initial=0.0)), counts, touched, unexplained)
+
+
+def _determined(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) nodes that have a position."""
+    return np.asarray(np.isfinite(points).all(axis=1))
+
+
+def _without_rounding(matrix: sp.csr_array) -> sp.csr_array:
+    """The matrix without entries that are nothing but rounding beside the diagonal entries of row and column."""
+    entry = matrix.tocoo()
+    diagonal = np.abs(matrix.diagonal())
+    real = np.abs(entry.data) > LAST_DIGITS * np.sqrt(diagonal[entry.row] * diagonal[entry.col])
+    place = entry.row[real], entry.col[real]
+    return sp.csr_array((entry.data[real], place), shape=matrix.shape)
+
+
+def _forces(
+    matrix: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    x: NDArray[np.float64],
+    displacements: tuple[int, ...],
+    rotations: tuple[int, ...],
+    allowed: float,
+) -> _Forces:
+    """Forces of all rows under rotations about each axis."""
+    order, moves, axes = len(node), len(displacements), rotations or (0, 1, 2)
+    entry = matrix.tocoo()
+    i, j, value = entry.row, entry.col, entry.data
+    coupled = np.zeros(order, dtype=bool)
+    coupled[i[i != j]] = True
+    live = coupled & (direction >= 0)
+    arm = x[node[j]] - x[node[i]]
+    moved = np.array([*displacements, *(-1 for _ in rotations), -1])[direction[j]]
+
+    def added(terms: NDArray) -> NDArray:
+        return np.bincount(i, terms, order)
+
+    # Sums of the entries of each direction of displacements, without those of rows whose direction is not known.
+    shift = np.column_stack([added(np.where(moved == a, value, 0.0)) for a in displacements])
+    scale = added(np.abs(value) * (moved >= 0))[:, None]
+    still = np.abs(shift) <= allowed * np.where(scale > 0, scale, 1.0)
+    there = np.zeros((len(x), moves + len(rotations)), dtype=bool)
+    there[node[live], direction[live]] = True
+    reached = _determined(x)[node]
+    touched = added((~reached[j]).astype(float)) == 0
+    diagonal = np.abs(matrix.diagonal())
+    penalised = diagonal > _PENALTY * (added(np.abs(value)) - diagonal)
+    sound = live & touched & ~penalised
+    turning = direction >= moves
+    firm = np.ones(len(x), dtype=bool)  # nodes no force of which depends on translations
+    np.logical_and.at(firm, node[live & ~turning], (still.all(axis=1) & sound)[live & ~turning])
+    firm &= there[:, :moves].all(axis=1)
+    along = np.take_along_axis(still, np.where(turning, 0, np.maximum(direction, 0))[:, None], axis=1)[:, 0]
+    sound &= np.where(turning, firm[node], along)
+    length = np.linalg.norm(arm, axis=1)
+    lever = np.where(moved >= 0, np.where(np.isfinite(length), length, 0.0), (direction[j] >= 0).astype(float))
+    size = added(np.abs(value) * lever)
+    force, due = np.zeros((order, len(axes))), np.zeros((order, len(axes)), dtype=bool)
+    for k, axis in enumerate(axes):
+        turn = np.cross(np.eye(3)[axis], arm)
+        part = np.where(moved >= 0, np.take_along_axis(turn, np.maximum(moved, 0)[:, None], axis=1)[:, 0], 0.0)
+        if rotations:
+            part = np.where(direction[j] == moves + k, 1.0, part)
+        force[:, k] = added(value * np.where(np.isfinite(part), part, 0.0))
+        across = [m for m, a in enumerate(displacements) if a != axis]
+        needed = [*across, moves + k] if rotations else across
+        lacks = np.asarray(~there[:, needed].all(axis=1))
+        lacking = added(lacks[node[j]].astype(float)) > 0
+        due[:, k] = sound & still[:, across].all(axis=1) & ~lacking & (size > 0)
+    return _Forces(force, size, due)
+
+
+def _springs_to_ground(
+    forces: _Forces,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    moves: int,
+    turns: int,
+    allowed: float,
+) -> NDArray[np.bool_]:
+    """(N, axes) moments that springs between the rotations of a node and the ground may have.
+
+    Such springs have a symmetric matrix. Of two moments that mirror each other one alone shows nothing.
+    """
+    may = np.zeros(forces.force.shape, dtype=bool)
+    row_at = np.full((int(node.max()) + 1, turns), -1)
+    turning = np.flatnonzero(direction >= moves)
+    row_at[node[turning], direction[turning] - moves] = turning
+    for a in range(turns):
+        for b in range(turns):
+            one, other = row_at[:, a], row_at[:, b]
+            pair = (one >= 0) & (other >= 0)
+            may[one[(one >= 0) & ~pair], b] = True
+            one, other = one[pair], other[pair]
+            gap = np.abs(forces.force[one, b] - forces.force[other, a])
+            alike = gap <= allowed * (forces.size[one] + forces.size[other])
+            may[one, b] = alike | ~forces.due[other, a]
+    return may
+
+
+def _members(
+    matrix: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    x: NDArray[np.float64],
+    displacements: tuple[int, ...],
+    rotations: tuple[int, ...],
+    members: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """(m,) largest misfit of the block of each member's nodes, relative to the part of it where it is largest.
+
+    Members without positions at both ends are left out. Parts couple displacements or rotations to either.
+    """
+    b, moves = len(displacements) + len(rotations), len(displacements)
+    members = members[_determined(x)[members].all(axis=1)]
+    row_at = np.full((len(x), b), -1)
+    told = np.flatnonzero(direction >= 0)
+    row_at[node[told], direction[told]] = told
+    members = members[(row_at[members] >= 0).all(axis=(1, 2))]
+    rows, columns = np.broadcast_arrays(row_at[members[:, 0], :, None], row_at[members[:, 1], None, :])
+    if not len(members):
+        return np.empty(0)
+    block = np.asarray(sp.coo_array(matrix[rows.ravel(), columns.ravel()]).toarray()).reshape(-1, b, b)
+    axes = np.array([*displacements, *(3 + a for a in rotations)])
+    whole = np.zeros((len(block), 6, 6))
+    whole[:, axes[:, None], axes] = block
+    again = _member_between(whole, x[members[:, 1]] - x[members[:, 0]])[:, axes[:, None], axes]
+    misfit = np.zeros(len(block))
+    for first in (slice(moves), slice(moves, None)):
+        for second in (slice(moves), slice(moves, None)):
+            size = np.abs(block[:, first, second]).max(axis=(1, 2), initial=0.0)
+            off = np.abs(block[:, first, second] - again[:, first, second]).max(axis=(1, 2), initial=0.0)
+            misfit = np.maximum(misfit, np.where(off > 0, off / np.where(size > 0, size, np.finfo(float).tiny), 0.0))
+    return misfit
+
+
+def _member_between(block: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 6, 6) blocks of the first end's row and the second end's column of members with the sections of those given.
+
+    In axes of the member deflections v and slopes s, with the stiffness S = 12 E I / l^3 of both planes, (2, 2), have
+    -S between deflections, S l / 2 and -S l / 2 between deflections and slopes, and S l^2 / 6 between slopes.
+    """
+    length = np.linalg.norm(along, axis=1)
+    frame = _frames(along / np.where(length > 0, length, 1.0)[:, None])
+    turned = np.zeros((len(block), 6, 6))
+    turned[:, :3, :3] = turned[:, 3:, 3:] = frame
+    local = turned.transpose(0, 2, 1) @ block @ turned
+    bending = -(local[:, 1:3, 1:3] + local[:, 1:3, 1:3].transpose(0, 2, 1)) / 2
+    slope = np.array([[0.0, 1.0], [-1.0, 0.0]])  # of v by rotations about the two axes across the member
+    half, sixth = (length / 2)[:, None, None], (length**2 / 6)[:, None, None]
+    again = np.zeros_like(local)
+    again[:, 0, 0], again[:, 3, 3] = local[:, 0, 0], local[:, 3, 3]
+    again[:, 1:3, 1:3] = -bending
+    again[:, 1:3, 4:] = half * bending @ slope
+    again[:, 4:, 1:3] = -half * slope.T @ bending
+    again[:, 4:, 4:] = sixth * slope.T @ bending @ slope
+    return np.asarray(turned @ again @ turned.transpose(0, 2, 1))
+
+
+def _frames(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 3) right-handed axes, as columns, of which the first are the given unit vectors."""
+    least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
+    second = np.cross(least, axis)
+    norm = np.linalg.norm(second, axis=1, keepdims=True)
+    second = second / np.where(norm > 0, norm, 1.0)
+    return np.stack([axis, second, np.cross(axis, second)], axis=2)
+
+
+def _only_members(matrix: sp.csr_array, node: NDArray[np.int64], members: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(N,) rows of nodes that members join to all nodes that they are coupled to."""
+    entry, n = matrix.tocoo(), int(node.max()) + 1
+    i, j = np.minimum(node[entry.row], node[entry.col]), np.maximum(node[entry.row], node[entry.col])
+    key = np.unique((i * n + j)[i < j])
+    other = key[~np.isin(key, np.sort(members, axis=1) @ np.array([n, 1]))]
+    mixed = np.concatenate([other // n, other % n])
+    return np.isin(node, members) & ~np.isin(node, mixed)
