@@ -102,7 +102,7 @@ class NormalEquations:
         return np.column_stack([jacobian.transpose(change) for change in changes.T])
 
     def _conjugate(self, jacobian: Jacobian, changes: NDArray, start: NDArray) -> NDArray:
-        """Least |J d - r| by conjugate gradients from a start d (n, k), each column by itself, the factor preconditioning.
+        """Least |J d - r| by conjugate gradients from a start d (n, k), preconditioned by the factor, column by column.
 
         A. Bjorck, Numerical Methods for Least Squares Problems (1996), section 7.4. A column is done where what is to
         come changes J d by next to nothing of the residual; the best d on the way is kept.
