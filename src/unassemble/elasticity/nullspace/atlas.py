@@ -33,6 +33,7 @@ from .identities import Identities, identities
 PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
+_CORRECTIONS = 2
 
 Of = Callable[[NDArray[np.int64]], Identities]  # those of some rows
 
@@ -81,25 +82,46 @@ def _joined(charts: list[Fields], n: int) -> tuple[NDArray[np.int64], NDArray[np
         form[place[k], place[m]] -= product
         if k != m:
             form[place[m], place[k]] -= product.T
-    coefficients = _lowest(form, min(_MOST, len(form)))
-    fields = np.zeros((n, d, coefficients.shape[1]))
-    for one, here in zip(charts, place, strict=True):
-        fields[one.nodes] += one.fields @ coefficients[here]
-    nodes = np.flatnonzero(copies)
-    mean = fields[nodes] / copies[nodes, None, None]
+    copies = np.maximum(copies, 1)
+
+    def met(coefficients: NDArray) -> NDArray:
+        """(n, d, k) the mean of the charts."""
+        fields = np.zeros((n, d, coefficients.shape[1]))
+        for one, here in zip(charts, place, strict=True):
+            fields[one.nodes] += one.fields @ coefficients[here]
+        return fields / copies[:, None, None]
+
+    def gradient(coefficients: NDArray) -> NDArray:
+        """The form times coefficients, from differences of the charts: those next to nothing keep their digits."""
+        mean, found = met(coefficients), np.empty_like(coefficients)
+        for one, here in zip(charts, place, strict=True):
+            apart = one.fields @ coefficients[here] - mean[one.nodes]
+            found[here] = one.values[:, None] ** 2 * coefficients[here] + np.einsum("ndk,ndl->kl", one.fields, apart)
+        return found
+
+    nodes = np.unique(nodes)
+    mean = met(_lowest(form, min(_MOST, len(form)), gradient))[nodes]
     flat = np.linalg.qr(mean.reshape(len(nodes) * d, -1))[0]
     return nodes, flat.reshape(len(nodes), d, -1)
 
 
-def _lowest(form: NDArray, count: int) -> NDArray:
-    """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration."""
+def _lowest(form: NDArray, count: int, gradient: Callable[[NDArray], NDArray]) -> NDArray:
+    """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration.
+
+    Soft fields have the squares of their singular values as eigenvalues, beside which rounding of the form is not
+    small: null vectors are mixed with them. `gradient` is the form times vectors, without that rounding.
+    """
     factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(len(form)))
     x = np.random.default_rng(0).standard_normal((len(form), count))
     for _ in range(4):
         x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
     values, v = scipy.linalg.eigh(x.T @ form @ x)
+    x = x @ v
+    null = values < ALIKE**2
+    for _ in range(_CORRECTIONS):  # the error is then that of the gradient, not of the factor
+        x[:, null] -= scipy.linalg.cho_solve(factor, gradient(x[:, null]))
     # The stiff rest says nothing but where it begins.
-    return np.asarray(x @ v[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
+    return np.asarray(x[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
 
 
 @dataclass(frozen=True, eq=False)
