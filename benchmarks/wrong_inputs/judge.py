@@ -1,0 +1,262 @@
+"""Whether a certificate is wrong, by the truth about its mesh.
+
+An answer is judged by what it claims: points of `node_status` 0, piece by piece, up to what the matrix leaves free, and
+cells between such points. Nothing is claimed of the others, and nothing by an answer that is not certified.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from hostile import gives_back, lengths_give_back, masses
+from numpy.typing import NDArray
+
+from unassemble import Body, PlanarMesh, Recovery, Structure, Surface, recover
+
+from .truth import Truth
+
+CLOSE = 1e-6  # of points, relative to the diameter of their piece, where the answer has no error bar
+SAME = 1e-11  # of entries, relative to their rows: as near as another assembler comes to the very entries
+SEEN = 1e-8  # share of a cell in the entries of the rows in which it shows most: a certificate misses no such cell
+SIZELESS = ("truss", "elasticity", "structure")  # matrices of displacements alone tell no size
+NAMES = re.compile(r"\b(other|others|another|also|as well|same entries)\b")
+
+
+def outcome_of(truth: Truth, found: Recovery) -> tuple[str, str]:
+    """``right``, ``alias``, ``ambiguous``, ``uncertified`` or ``WRONG``, and what is wrong.
+
+    An alias is another mesh with the very entries, of which a warning speaks and that is not said to be proved. Where
+    the entries were changed such a mesh is right: they are its own then.
+    """
+    if found.status != "certified":
+        return ("ambiguous" if found.status == "ambiguous" else "uncertified"), ""
+    wrong = fault_of(truth, found)
+    if not wrong:
+        return "right", ""
+    if not has_the_entries(truth.matrix, found):
+        return "WRONG", wrong
+    if not truth.intact:
+        return "right", ""
+    if found.uniqueness == "proved":
+        return "WRONG", f"{wrong}; another mesh has the same entries, and this one is said to be proved"
+    if not any(NAMES.search(warning) for warning in found.warnings):
+        return "WRONG", f"{wrong}; another mesh has the same entries, and no warning says so"
+    return "alias", wrong
+
+
+def fault_of(truth: Truth, found: Recovery) -> str:
+    """What an answer claims and is not so, in a few words; empty where all of it is true."""
+    node = np.arange(found.n_points) if found.node_of_row is None else found.node_of_row
+    true_node = np.full(found.n_points, -1)
+    true_node[node] = truth.node
+    claimed = found.node_status == 0
+    mixed = np.zeros(found.n_points, dtype=bool)
+    np.logical_or.at(mixed, node, true_node[node] != truth.node)
+    if (mixed & claimed).any():
+        return f"node {np.flatnonzero(mixed & claimed)[0]} has rows of several nodes"
+    if isinstance(found, Surface):
+        return wrong_length(truth, found) or wrong_cells(truth, found, true_node)
+    if getattr(found, "areas", None) is not None:
+        return "" if truth.gauge == "areas" else "read as a mass matrix"
+    if truth.gauge == "lengths":
+        return "read as a mesh in the plane"
+    if claimed.any() and found.dim != truth.points.shape[1]:
+        return f"read as {found.operator!r}, in {found.dim} dimensions of {truth.points.shape[1]}"
+    bar = error_bar(truth, found)
+    for piece in np.unique(found.component[claimed & (found.component >= 0)]):
+        own = np.flatnonzero(claimed & (found.component == piece))
+        x, y = found.points[own], truth.points[true_node[own]]
+        if not np.isfinite(x).all():
+            return "a determined node without coordinates"
+        if isinstance(found, Body) and truth.direction is not None:
+            y = y[:, axes_of(truth, found, np.isin(node, own))]
+        off = misplaced(x, y, gauge_of(truth, found))
+        if off > bar:
+            return f"points off by {off:.1e} of the diameter, where {bar:.0e} is allowed"
+    return wrong_cells(truth, found, true_node)
+
+
+def gauge_of(truth: Truth, found: Recovery) -> str:
+    """What is free: of answers without a size a factor, of planar meshes rotations too."""
+    if isinstance(found, PlanarMesh):
+        return "similarity"
+    if isinstance(found, Structure) and found.operator not in SIZELESS:
+        return truth.gauge
+    return "homothety"
+
+
+def misplaced(x: NDArray, y: NDArray, gauge: str) -> float:
+    """Largest distance after the best map that is free, relative to the diameter; NaN in truths are left out."""
+    x, y = x[:, np.isfinite(y).all(axis=0)], y[:, np.isfinite(y).all(axis=0)]
+    extent = np.linalg.norm(np.ptp(y, axis=0))
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    if extent == 0:
+        return float(np.abs(x).max() > 1e-12)
+    square = max((x * x).sum(), 1e-300)
+    if gauge == "similarity":
+        u, s, v = np.linalg.svd(x.T @ y)
+        x = x @ (u @ v) * (s.sum() / square)
+    elif gauge == "homothety":
+        x = x * ((x * y).sum() / square)
+    return float(np.linalg.norm(x - y, axis=1).max() / extent)
+
+
+def axes_of(truth: Truth, found: Recovery, rows: NDArray[np.bool_]) -> list[int]:
+    """Which true axis each axis of the answer is, by most rows."""
+    d = found.dim
+    named = np.zeros((d, d))
+    both = rows & (found.direction_of_row < d)
+    np.add.at(named, (found.direction_of_row[both], truth.direction[both]), 1)
+    return list(max(permutations(range(d)), key=lambda one: named[range(d), one].sum()))
+
+
+def error_bar(truth: Truth, found: Recovery) -> float:
+    """How far off a point may be: what the answer says itself, or the usual."""
+    said = getattr(found, "position_error", None)
+    if said is not None:
+        return max(CLOSE, float(said))
+    noise = getattr(found, "chi_square", None)
+    if noise is None or not isinstance(found, PlanarMesh):
+        return CLOSE
+    again = recover(truth.matrix, standard_deviations=True)
+    extent = np.linalg.norm(np.nanmax(again.points, axis=0) - np.nanmin(again.points, axis=0))
+    return max(CLOSE, 10 * (again.largest_deviation or 0.0) / extent)
+
+
+def wrong_length(truth: Truth, found: Surface) -> str:
+    """Of sides between determined vertices, piece by piece, up to a factor."""
+    ends = found.edges[(found.node_status[found.edges] == 0).all(axis=1)]
+    own = found.edge_lengths[(found.node_status[found.edges] == 0).all(axis=1)]
+    true = np.linalg.norm(truth.points[ends[:, 0]] - truth.points[ends[:, 1]], axis=1)
+    piece = found.component[ends].max(axis=1) if len(ends) else np.empty(0, int)
+    for one in np.unique(piece):
+        ratio = own[piece == one] / np.maximum(true[piece == one], 1e-300)
+        if np.ptp(ratio) > CLOSE * np.median(ratio):
+            return f"lengths off by {np.ptp(ratio) / np.median(ratio):.1e}"
+    return ""
+
+
+def wrong_cells(truth: Truth, found: Recovery, true_node: NDArray[np.int64]) -> str:
+    """Cells between determined nodes that the truth does not have, or that the answer lacks.
+
+    Polygons stand for all triangles within them, and sides whose entries vanish for either diagonal of what is left
+    without them. No cells at all are no claim; nor is a cell missing that shows in no entry.
+    """
+    if truth.cells is None or found.n_cells == 0:
+        return ""
+    claimed = {int(k) for k in true_node[found.node_status == 0]}
+    true = {frozenset(cell): share for cell, share in zip(truth.cells, shares_of(truth), strict=True)}
+    own = {frozenset(cell) for some in found.cells.values() for cell in true_node[some].tolist()}
+    polygons = polygons_of(found, true_node)
+    vanished = vanishing_pairs(truth) if isinstance(found, PlanarMesh) else set()
+    for cell in own - set(true):
+        if cell <= claimed and not sides(cell) & vanished:
+            return f"a cell on nodes {sorted(cell)} that is none"
+    for cell, share in true.items():
+        inside = any(cell <= polygon for polygon in polygons)
+        if cell <= claimed and cell not in own and not inside and share > SEEN and not sides(cell) & vanished:
+            return f"no cell on nodes {sorted(cell)}"
+    return ""
+
+
+def shares_of(truth: Truth) -> NDArray[np.float64]:
+    return truth.shares if len(truth.shares) else np.ones(len(truth.cells or ()))
+
+
+def polygons_of(found: Recovery, true_node: NDArray[np.int64]) -> list[frozenset[int]]:
+    """Cells that a planar mesh leaves undivided."""
+    if not found.n_polygons:
+        return []
+    parts = np.split(found.polygons_data, found.polygons_offsets[1:-1])
+    return [frozenset(true_node[part].tolist()) for part in parts]
+
+
+def sides(cell: frozenset[int]) -> set[frozenset[int]]:
+    """Pairs of nodes of a cell."""
+    return {frozenset((a, b)) for a in cell for b in cell if a < b}
+
+
+def vanishing_pairs(truth: Truth) -> set[frozenset[int]]:
+    """Pairs in a cell whose entry is zero but for rounding."""
+    off = abs(truth.matrix - sp.diags_array(truth.matrix.diagonal())).tocsr()
+    largest = off.max(axis=1).toarray().ravel()
+    pairs = {pair for cell in truth.cells or () for pair in sides(frozenset(cell))}
+    row_of = dict(zip(truth.node.tolist(), range(len(truth.node)), strict=True))
+    gone = set()
+    for pair in pairs:
+        i, j = (row_of.get(k, -1) for k in pair)
+        if i >= 0 and j >= 0 and off[i, j] <= 1e-9 * max(largest[i], largest[j]):
+            gone.add(pair)
+    return gone
+
+
+def has_the_entries(matrix: sp.csr_array, found: Recovery) -> bool:
+    """Whether scikit-fem assembles the very entries on the mesh that was found."""
+    given = sp.csr_array(matrix)
+    if isinstance(found, Body):
+        return body_has_the_entries(given, found)
+    if isinstance(found, Surface):
+        return lengths_give_back(found, given, SAME)
+    if not isinstance(found, PlanarMesh) or found.areas is not None or found.vector_valued:
+        return False
+    if found.row_scaling is not None:
+        back = sp.diags_array(1 / found.row_scaling)
+        given = sp.csr_array(back @ given @ back)
+    if found.reaction and not gives_back(found, given, SAME):
+        given = sp.csr_array(given - found.reaction * masses(found))
+    return gives_back(found, given, SAME)
+
+
+def body_has_the_entries(given: sp.csr_array, found: Body) -> bool:
+    """The same of elastic bodies of one kind of cell, on the rows of determined nodes."""
+    kinds = {"triangle": "tri-p1", "triangle6": "tri-p2", "quad": "quad-q1", "quad8": "quad-s2", "quad9": "quad-q2",
+             "tetra": "tet-p1", "tetra10": "tet-p2", "hexahedron": "hex-q1"}  # fmt: skip
+    if len(found.cells) != 1 or not set(found.cells) <= set(kinds) or not len(found.lame):
+        return False
+    ((name, cells),) = found.cells.items()
+    return assembled_again(kinds[name], cells, found, given)
+
+
+def assembled_again(kind: str, cells: NDArray, found: Body, given: sp.csr_array) -> bool:
+    """Whether cells of a kind with Lame coefficients of their own add up to the given rows of determined nodes."""
+    import assembled
+
+    mesh_type, element = assembled.ELEMENTS[kind]
+    d = found.dim
+    corners = {"tri": 3, "quad": 4, "tet": 4, "hex": 8}[kind.split("-")[0]]
+    n = 0
+    parts = []
+    for cell, (lam, mu) in zip(cells, found.lame, strict=True):
+        points = found.points[cell[:corners]]
+        order = np.argsort(cell[:corners]) if kind.startswith(("tri", "tet")) else np.arange(corners)
+        if kind == "hex-q1":
+            order = np.array([0, 4, 3, 1, 7, 5, 2, 6])
+        mesh = mesh_type(points[order].T.copy(), np.arange(corners)[:, None])
+        one = assembled.stiffness(kind, mesh, lam=float(lam), mu=float(mu))
+        off = np.linalg.norm(one.points[:, None] - found.points[cell][None], axis=2)
+        nodes = cell[off.argmin(axis=1)]
+        rows = (nodes[:, None] * d + np.arange(d)).ravel()
+        dense = one.matrix.toarray()
+        parts.append((np.repeat(rows, len(rows)), np.tile(rows, len(rows)), dense.ravel()))
+        n = max(n, off.min(axis=1).max())
+    size = found.n_points * d
+    i, j, value = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    total = sp.coo_array((value, (i, j)), shape=(size, size)).tocsr()
+    own = found.node_of_row * d + found.direction_of_row
+    known = (found.node_status[found.node_of_row] == 0) & (found.direction_of_row < d)
+    rows = np.flatnonzero(known)
+    a, b = given[rows][:, rows].toarray(), total[own[rows]][:, own[rows]].toarray()
+    for one in (a, b):
+        np.fill_diagonal(one, 0)
+    largest = np.abs(given).max(axis=1).toarray().ravel()[rows]
+    factor = (a * b).sum() / max((b * b).sum(), 1e-300)
+    return bool((np.abs(a - factor * b) <= SAME * largest[:, None]).all()) and n < 1e-9
+
+
+def checked(truth: Truth, **options: Any) -> tuple[str, str]:
+    """What comes of a matrix, and what is wrong."""
+    return outcome_of(truth, recover(truth.matrix, **options))
