@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,20 +50,20 @@ def outcome_of(truth: Truth, found: Recovery) -> tuple[str, str]:
 def fault_of(truth: Truth, found: Recovery) -> str:
     """What an answer claims and is not so, in a few words; empty where all of it is true."""
     node = np.arange(found.n_points) if found.node_of_row is None else found.node_of_row
+    placed = np.ones(len(node), dtype=bool) if found.direction_of_row is None else found.direction_of_row >= 0
     true_node = np.full(found.n_points, -1)
     true_node[node] = truth.node
+    true_node[node[placed]] = truth.node[placed]
     claimed = found.node_status == 0
-    mixed = np.zeros(found.n_points, dtype=bool)
-    np.logical_or.at(mixed, node, true_node[node] != truth.node)
+    mixed = np.zeros(found.n_points, dtype=bool)  # a row without a direction claims nothing
+    np.logical_or.at(mixed, node[placed], (true_node[node] != truth.node)[placed])
     if (mixed & claimed).any():
         return f"node {np.flatnonzero(mixed & claimed)[0]} has rows of several nodes"
-    if isinstance(found, Surface):
-        return wrong_length(truth, found) or wrong_cells(truth, found, true_node)
     if getattr(found, "areas", None) is not None:
-        return "" if truth.gauge == "areas" else "read as a mass matrix"
-    if truth.gauge == "lengths":
-        return "read as a mesh in the plane"
-    if claimed.any() and found.dim != truth.points.shape[1]:
+        return "read as a mass matrix"
+    if isinstance(found, Surface) or (isinstance(found, PlanarMesh) and truth.gauge == "lengths"):
+        return wrong_length(truth, found) or wrong_cells(truth, found, true_node)
+    if found.dim > truth.points.shape[1]:
         return f"read as {found.operator!r}, in {found.dim} dimensions of {truth.points.shape[1]}"
     bar = error_bar(truth, found)
     for piece in np.unique(found.component[claimed & (found.component >= 0)]):
@@ -72,9 +71,12 @@ def fault_of(truth: Truth, found: Recovery) -> str:
         x, y = found.points[own], truth.points[true_node[own]]
         if not np.isfinite(x).all():
             return "a determined node without coordinates"
-        if isinstance(found, Body) and truth.direction is not None:
-            y = y[:, axes_of(truth, found, np.isin(node, own))]
-        off = misplaced(x, y, gauge_of(truth, found))
+        if found.dim < y.shape[1]:
+            off = within_plane(x, y)
+        elif isinstance(found, Body) and truth.direction is not None:
+            off = misplaced(x, y[:, axes_of(truth, found, np.isin(node, own))], gauge_of(truth, found))
+        else:
+            off = misplaced(x, y, gauge_of(truth, found))
         if off > bar:
             return f"points off by {off:.1e} of the diameter, where {bar:.0e} is allowed"
     return wrong_cells(truth, found, true_node)
@@ -85,7 +87,8 @@ def gauge_of(truth: Truth, found: Recovery) -> str:
     if isinstance(found, PlanarMesh):
         return "similarity"
     if isinstance(found, Structure) and found.operator not in SIZELESS:
-        return truth.gauge
+        turned = any("in a direction that is free" in warning for warning in found.warnings)
+        return "motion" if turned else truth.gauge
     return "homothety"
 
 
@@ -97,12 +100,23 @@ def misplaced(x: NDArray, y: NDArray, gauge: str) -> float:
     if extent == 0:
         return float(np.abs(x).max() > 1e-12)
     square = max((x * x).sum(), 1e-300)
-    if gauge == "similarity":
+    if gauge in ("similarity", "motion"):
         u, s, v = np.linalg.svd(x.T @ y)
-        x = x @ (u @ v) * (s.sum() / square)
+        x = x @ (u @ v) * (s.sum() / square if gauge == "similarity" else 1.0)
     elif gauge == "homothety":
         x = x * ((x * y).sum() / square)
     return float(np.linalg.norm(x - y, axis=1).max() / extent)
+
+
+def within_plane(x: NDArray, y: NDArray) -> float:
+    """The same in space, for answers in a plane (n, 2) where the matrix falls into one for bending and one for forces.
+
+    That is so where all nodes are in a plane across an axis, whichever; else the error is infinite.
+    """
+    flat = np.flatnonzero(np.ptp(y, axis=0) <= 1e-9 * np.linalg.norm(np.ptp(y, axis=0)))
+    pairs = [[a, b] for a, b in permutations(range(3), 2) if set(range(3)) - {a, b} <= set(flat.tolist())]
+    turned = [y[:, pair] * signs for pair in pairs for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    return min((misplaced(x, one, "translation") for one in turned), default=np.inf)
 
 
 def axes_of(truth: Truth, found: Recovery, rows: NDArray[np.bool_]) -> list[int]:
@@ -119,24 +133,31 @@ def error_bar(truth: Truth, found: Recovery) -> float:
     said = getattr(found, "position_error", None)
     if said is not None:
         return max(CLOSE, float(said))
-    noise = getattr(found, "chi_square", None)
-    if noise is None or not isinstance(found, PlanarMesh):
+    if getattr(found, "chi_square", None) is None or not isinstance(found, PlanarMesh):
         return CLOSE
-    again = recover(truth.matrix, standard_deviations=True)
+    again = recover(truth.matrix, **truth.options, standard_deviations=True)
     extent = np.linalg.norm(np.nanmax(again.points, axis=0) - np.nanmin(again.points, axis=0))
     return max(CLOSE, 10 * (again.largest_deviation or 0.0) / extent)
 
 
-def wrong_length(truth: Truth, found: Surface) -> str:
+def wrong_length(truth: Truth, found: Surface | PlanarMesh) -> str:
     """Of sides between determined vertices, piece by piece, up to a factor."""
-    ends = found.edges[(found.node_status[found.edges] == 0).all(axis=1)]
-    own = found.edge_lengths[(found.node_status[found.edges] == 0).all(axis=1)]
+    if isinstance(found, Surface):
+        ends, length = found.edges, found.edge_lengths
+    else:
+        whole = found.divided()[0]
+        ends = np.concatenate([whole[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+        length = np.linalg.norm(found.points[ends[:, 0]] - found.points[ends[:, 1]], axis=1)
+    known = (found.node_status[ends] == 0).all(axis=1)
+    ends, length = ends[known], length[known]
     true = np.linalg.norm(truth.points[ends[:, 0]] - truth.points[ends[:, 1]], axis=1)
     piece = found.component[ends].max(axis=1) if len(ends) else np.empty(0, int)
+    allowed = error_bar(truth, found)
     for one in np.unique(piece):
-        ratio = own[piece == one] / np.maximum(true[piece == one], 1e-300)
-        if np.ptp(ratio) > CLOSE * np.median(ratio):
-            return f"lengths off by {np.ptp(ratio) / np.median(ratio):.1e}"
+        ratio = length[piece == one] / np.maximum(true[piece == one], 1e-300)
+        off = np.ptp(ratio) / np.median(ratio)
+        if off > allowed:
+            return f"lengths off by {off:.1e}, where {allowed:.0e} is allowed"
     return ""
 
 
@@ -257,6 +278,6 @@ def assembled_again(kind: str, cells: NDArray, found: Body, given: sp.csr_array)
     return bool((np.abs(a - factor * b) <= SAME * largest[:, None]).all()) and n < 1e-9
 
 
-def checked(truth: Truth, **options: Any) -> tuple[str, str]:
+def checked(truth: Truth) -> tuple[str, str]:
     """What comes of a matrix, and what is wrong."""
-    return outcome_of(truth, recover(truth.matrix, **options))
+    return outcome_of(truth, recover(truth.matrix, **truth.options))

@@ -140,9 +140,7 @@ def few_members(rng: Generator) -> Truth:
 
 def prestressed(rng: Generator) -> Truth:
     """Members with an axial force of their own: geometric stiffness besides the elastic one."""
-    given = any_structure(rng)
-    while len(given.members) == 0:
-        given = any_structure(rng)
+    given = with_members(rng)
     axial = np.full(len(given.members), 1.0)
     sort = rng.integers(4)
     if sort == 1:
@@ -152,8 +150,22 @@ def prestressed(rng: Generator) -> Truth:
     elif sort == 3:
         axial = rng.uniform(0, 1, len(axial))
     added = geometric(given, axial, consistent=bool(rng.integers(2)))
-    size = 10 ** rng.uniform(-9, 0.5) * np.abs(given.matrix.data).max() / max(np.abs(added.data).max(initial=0), 1e-300)
+    largest = np.abs(added.data).max(initial=0.0)
+    size = 10 ** rng.uniform(-9, 0.5) * np.abs(given.matrix.data).max() / largest if largest > 0 else 0.0
     return as_handed_over(replace(given, matrix=sp.csr_array(given.matrix + size * added)), rng, exact=0.8)
+
+
+def with_members(rng: Generator) -> Built:
+    """Half of them lattices of members, most of them regular: there forces alone may fit a wrong size."""
+    if rng.random() < 0.25:
+        counts = (int(rng.integers(2, 4)), int(rng.integers(1, 4)), int(rng.integers(2, 4)))
+        return built.frame(counts, int(rng.integers(1 << 30)), float(rng.choice([0.0, 0.0, 0.1])))
+    if rng.random() < 0.25:
+        return lattice(rng)
+    given = any_structure(rng)
+    while len(given.members) == 0:
+        given = any_structure(rng)
+    return given
 
 
 def geometric(given: Built, axial: NDArray, *, consistent: bool) -> sp.csr_array:
@@ -187,7 +199,7 @@ def geometric(given: Built, axial: NDArray, *, consistent: bool) -> sp.csr_array
 
 def sprung(rng: Generator) -> Truth:
     """Springs, equal in all directions, between nodes, or to the ground; some of rotations."""
-    given = any_structure(rng)
+    given = any_structure(rng) if rng.integers(2) else with_members(rng)
     n, block = len(given.points), given.block
     moves = np.flatnonzero(np.isin(given.unknowns, (0, 1, 2)))
     turns = np.flatnonzero(np.isin(given.unknowns, (3, 4, 5)))

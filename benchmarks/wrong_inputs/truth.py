@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,6 +39,7 @@ class Truth:
     shares: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     #: Whether the mesh gives the entries back: of a damaged matrix another mesh may be right.
     intact: bool = True
+    options: dict[str, Any] = field(default_factory=dict)  #: Those of :func:`unassemble.recover`.
 
     def kept(self, rows: NDArray[np.int64]) -> Truth:
         """Some rows and columns, in this order."""
