@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 from numpy.typing import NDArray
+from skfem.models import laplace
 
 from .truth import Truth, damaged, rounded  # first: it names the folders of the tests
 
@@ -27,8 +28,8 @@ class Body:
     case: Assembled
     #: (m, k) all nodes of each cell.
     cells: NDArray[np.int64]
-    #: (m,) how stiff each cell is, at least and at most.
-    factor: NDArray[np.float64]
+    #: (m,) how much each cell contributes to the rows in which it shows most.
+    shares: NDArray[np.float64]
 
 
 def any_kind(rng: Generator) -> str:
@@ -77,19 +78,19 @@ def body_on(kind: str, mesh: skfem.Mesh, factor: NDArray, lam: float, *, within=
         case = stiffness(kind, mesh, lam=lambda x: lam_mu[0] + 0 * x[0], mu=lambda x: lam_mu[1] + 0 * x[0])
     else:
         case = stiffness(kind, mesh, lam=within, mu=lambda x: 1 + 0 * x[0], within=True, form=form)
-    basis = skfem.Basis(mesh, ELEMENTS[kind][1](), intorder=1)
+    basis = skfem.Basis(mesh, ELEMENTS[kind][1](), intorder={"hex-q1": 2}.get(kind))
     groups = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     order = np.concatenate([group[0] for group in groups if group is not None and group.size])
     place = np.empty(basis.N, dtype=np.int64)
     place[order] = np.arange(basis.N)
-    return Body(case, place[basis.element_dofs.T], factor)
+    cells = place[basis.element_dofs.T]
+    return Body(case, cells, shares_of(factor[:, None, None] * np.abs(laplace.coo_data(basis).tolocal()), cells))
 
 
-def shares_of(body: Body) -> NDArray[np.float64]:
-    """Of the stiffest cell about each node, in the node where that is least."""
-    stiffest = np.zeros(len(body.case.points))
-    np.maximum.at(stiffest, body.cells, body.factor[:, None] + np.zeros(body.cells.shape))
-    return (body.factor[:, None] / stiffest[body.cells]).max(axis=1)
+def shares_of(local: NDArray, cells: NDArray) -> NDArray[np.float64]:
+    """How much cells (m, k) contribute to the rows of nodes, as those of a Laplacian (m, k, k), at the most, (m,)."""
+    size = np.bincount(cells.ravel(), np.diagonal(local, axis1=1, axis2=2).ravel())[cells]
+    return (local / np.minimum(size[:, :, None], size[:, None, :])).max(axis=(1, 2))
 
 
 def as_handed_over(body: Body, rng: Generator, *, exact: float = 0.6) -> Truth:
@@ -103,7 +104,7 @@ def as_handed_over(body: Body, rng: Generator, *, exact: float = 0.6) -> Truth:
     support = str(rng.choice(["free", "free", *SUPPORTS]))
     held = given(moved, support, ordered, str(rng.choice(ZEROS)), seed=int(rng.integers(1 << 30)))
     cells = tuple(map(tuple, place[body.cells].tolist()))
-    truth = Truth(held.matrix, held.node, case.points[order], "homothety", held.direction, cells, shares_of(body))
+    truth = Truth(held.matrix, held.node, case.points[order], "homothety", held.direction, cells, body.shares)
     if truth.matrix.shape[0] < 3:
         return as_handed_over(body, rng, exact=exact)
     if rng.random() < 0.1:

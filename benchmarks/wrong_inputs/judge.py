@@ -20,7 +20,6 @@ from .truth import Truth
 
 CLOSE = 1e-6  # of points, relative to the diameter of their piece, where the answer has no error bar
 SAME = 1e-11  # of entries, relative to their rows: as near as another assembler comes to the very entries
-SEEN = 1e-8  # share of a cell in the entries of the rows in which it shows most: a certificate misses no such cell
 SIZELESS = ("truss", "elasticity", "structure")  # matrices of displacements alone tell no size
 NAMES = re.compile(r"\b(other|others|another|also|as well|same entries)\b")
 
@@ -179,7 +178,7 @@ def wrong_cells(truth: Truth, found: Recovery, true_node: NDArray[np.int64]) -> 
             return f"a cell on nodes {sorted(cell)} that is none"
     for cell, share in true.items():
         inside = any(cell <= polygon for polygon in polygons)
-        if cell <= claimed and cell not in own and not inside and share > SEEN and not sides(cell) & vanished:
+        if cell <= claimed and cell not in own and not inside and share > truth.seen and not sides(cell) & vanished:
             return f"no cell on nodes {sorted(cell)}"
     return ""
 

@@ -35,8 +35,10 @@ class Truth:
     direction: NDArray[np.int64] | None = None
     #: Cells as tuples of nodes, None where the answer's own are not compared.
     cells: tuple[tuple[int, ...], ...] | None = None
-    #: (m,) how much each cell contributes to the rows in which it shows most, 1 the most.
+    #: (m,) how much each cell contributes to the rows in which it shows most; none where all show.
     shares: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: The share above which a certificate misses no cell: ten times what it allows, or what rounding hides.
+    seen: float = 1e-8
     #: Whether the mesh gives the entries back: of a damaged matrix another mesh may be right.
     intact: bool = True
     options: dict[str, Any] = field(default_factory=dict)  #: Those of :func:`unassemble.recover`.
@@ -50,7 +52,8 @@ class Truth:
 
 def rounded(truth: Truth, rng: np.random.Generator) -> Truth:
     """The entries to 4 to 15 significant digits."""
-    return replace(truth, matrix=written(truth.matrix, int(rng.integers(4, 16))), intact=False)
+    digits = int(rng.integers(4, 16))
+    return replace(truth, matrix=written(truth.matrix, digits), intact=False, seen=max(1e-8, 10.0 ** (2 - digits)))
 
 
 def damaged(truth: Truth, rng: np.random.Generator) -> Truth:
