@@ -134,13 +134,21 @@ def main() -> int:
     kinds = [chosen.kinds[k % len(chosen.kinds)] for k in places]
     numbers = [chosen.first + k // len(chosen.kinds) for k in places]
     outcomes = []
-    with ProcessPoolExecutor(chosen.jobs) as pool:
-        for one in pool.map(tried, kinds, numbers, repeat(chosen.seconds), chunksize=4 if chosen.cases > 99 else 1):
-            outcomes.append(one)
-            if chosen.list or one.word in ("WRONG", "ERROR"):
-                print(f"{one.word}: {one.again}  # {one.rows} rows, {one.seconds:.1f} s: {one.said}", flush=True)
+    for one in results(chosen.jobs, kinds, numbers, chosen.seconds):
+        outcomes.append(one)
+        if chosen.list or one.word in ("WRONG", "ERROR"):
+            print(f"{one.word}: {one.again}  # {one.rows} rows, {one.seconds:.1f} s: {one.said}", flush=True)
     print(table_of(outcomes))
     return int(any(one.word == "WRONG" for one in outcomes))
+
+
+def results(jobs: int, kinds: list[str], numbers: list[int], seconds: float) -> Iterator[Outcome]:
+    """In this order, by so many processes."""
+    if jobs == 1:
+        yield from map(tried, kinds, numbers, repeat(seconds))
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(tried, kinds, numbers, repeat(seconds), chunksize=4)
 
 
 if __name__ == "__main__":

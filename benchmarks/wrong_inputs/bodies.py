@@ -229,6 +229,35 @@ def sprung(rng: Generator) -> Truth:
     return truth
 
 
+def hanging(rng: Generator) -> Truth:
+    """Few elements, some of whose nodes lack rows and hang on a spring that joins them to another node."""
+    body = plain_body(rng, few=rng.random() < 0.7)
+    case, d, n = body.case, body.case.dim, len(body.case.points)
+    ends = rng.permutation(n)[: 2 * int(rng.integers(1, 3))].reshape(-1, 2)
+    total = np.zeros((n, d) * 2)
+    for i, j in ends:
+        axis = case.points[i] - case.points[j]
+        block = (np.outer(axis, axis) / (axis @ axis), np.eye(d), np.diag(np.arange(d) == 0))[rng.integers(3)]
+        block = case.matrix.diagonal().mean() * 10 ** rng.uniform(-3, 1) * block
+        for a, b, sign in ((i, i, 1), (j, j, 1), (i, j, -1), (j, i, -1)):
+            total[a, :, b] += sign * block
+    keep = np.ones((n, d), dtype=bool)
+    keep[ends[:, 0]] = rng.random((len(ends), d)) < 0.5
+    beside = np.isin(body.cells, ends[:, 0]).any(axis=1)
+    if rng.integers(2) and beside.any():  # nodes of the same cells are gone
+        others = rng.choice(np.unique(body.cells[beside]), int(rng.integers(1, 4)))
+        keep[np.setdiff1d(others, ends)] = False
+    entries = sp.csr_array(total.reshape(n * d, -1))
+    matrix = sp.csr_array(case.matrix + entries)
+    cells = tuple(map(tuple, body.cells.tolist()))
+    node, direction = np.divmod(np.arange(n * d), d)
+    truth = Truth(matrix, node, case.points, "homothety", direction, cells, body.shares)
+    order = rng.permutation(n)[node]
+    rows = np.lexsort((direction, order))
+    rows = rows[keep.ravel()[rows]]
+    return truth.kept(rows) if len(rows) > 3 else hanging(rng)
+
+
 def spoiled(rng: Generator) -> Truth:
     """Entries that are not what they were."""
     return damaged(as_handed_over(plain_body(rng, few=rng.random() < 0.3), rng, exact=1.0), rng)
@@ -241,5 +270,6 @@ BODIES = {
     "body-smooth": smooth,
     "body-axisymmetric": axisymmetric,
     "body-springs": sprung,
+    "body-hanging": hanging,
     "body-damaged": spoiled,
 }

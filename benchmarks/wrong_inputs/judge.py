@@ -164,9 +164,10 @@ def wrong_cells(truth: Truth, found: Recovery, true_node: NDArray[np.int64]) -> 
     """Cells between determined nodes that the truth does not have, or that the answer lacks.
 
     Polygons stand for all triangles within them, and sides whose entries vanish for either diagonal of what is left
-    without them. No cells at all are no claim; nor is a cell missing that shows in no entry.
+    without them. No cells at all are no claim, nor are members, which are read off the graph; nor is a cell missing that
+    shows in no entry.
     """
-    if truth.cells is None or found.n_cells == 0:
+    if truth.cells is None or found.n_cells == 0 or isinstance(found, Structure):
         return ""
     claimed = {int(k) for k in true_node[found.node_status == 0]}
     true = {frozenset(cell): share for cell, share in zip(truth.cells, shares_of(truth), strict=True)}

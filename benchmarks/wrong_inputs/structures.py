@@ -317,6 +317,26 @@ def rigid_links(rng: Generator) -> Truth:
     return with_ties(given, (slaves, masters, ~pinned), feet, rng)
 
 
+def contrasts(rng: Generator) -> Truth:
+    """Some members 1e-12 to 1e12 as stiff as the others, or all of a stiffness of their own."""
+    given = with_members(rng)
+    contrast = 10 ** rng.uniform(-12, 12)
+    parts = 2 if rng.integers(2) else 5
+    part = rng.integers(parts, size=len(given.members))
+    turned, seed = bool(rng.integers(2)), int(rng.integers(1 << 30))
+    total = sp.csr_array(given.matrix.shape)
+    for k in range(parts):
+        ends = given.members[part == k]
+        model = model_on(given.points)
+        pinned = given.block == given.points.shape[1] and given.unknowns[-1] < 3
+        add_members(model, ends, seed + k, turned=turned and given.block == 6, pinned=pinned)
+        if len(ends):
+            one = assembled(model, given.points, ends)
+            one = one if given.block == 6 else one.only(given.unknowns, given.points.shape[1])
+            total = total + contrast ** (k / (parts - 1)) * one.matrix
+    return as_handed_over(replace(given, matrix=sp.csr_array(total)), rng, exact=0.8)
+
+
 def spoiled(rng: Generator) -> Truth:
     """Entries that are not what they were."""
     return damaged(as_handed_over(any_structure(rng, few=rng.random() < 0.2), rng, exact=1.0), rng)
@@ -325,6 +345,7 @@ def spoiled(rng: Generator) -> Truth:
 STRUCTURES = {
     "structure": plain,
     "structure-few": few_members,
+    "structure-contrast": contrasts,
     "structure-prestress": prestressed,
     "structure-springs": sprung,
     "structure-floors": rigid_floors,
