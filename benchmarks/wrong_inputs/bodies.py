@@ -93,6 +93,13 @@ def shares_of(local: NDArray, cells: NDArray) -> NDArray[np.float64]:
     return (local / np.minimum(size[:, :, None], size[:, None, :])).max(axis=(1, 2))
 
 
+def truth_of(body: Body) -> Truth:
+    """Node by node, without supports."""
+    node, direction = np.divmod(np.arange(body.case.matrix.shape[0]), body.case.dim)
+    cells = tuple(map(tuple, body.cells.tolist()))
+    return Truth(body.case.matrix, node, body.case.points, "homothety", direction, cells, body.shares)
+
+
 def as_handed_over(body: Body, rng: Generator, *, exact: float = 0.6) -> Truth:
     """With a support, an order of the unknowns, zeros or none, and maybe rounded."""
     case, n = body.case, len(body.case.points)
@@ -247,13 +254,9 @@ def hanging(rng: Generator) -> Truth:
     if rng.integers(2) and beside.any():  # nodes of the same cells are gone
         others = rng.choice(np.unique(body.cells[beside]), int(rng.integers(1, 4)))
         keep[np.setdiff1d(others, ends)] = False
-    entries = sp.csr_array(total.reshape(n * d, -1))
-    matrix = sp.csr_array(case.matrix + entries)
-    cells = tuple(map(tuple, body.cells.tolist()))
-    node, direction = np.divmod(np.arange(n * d), d)
-    truth = Truth(matrix, node, case.points, "homothety", direction, cells, body.shares)
-    order = rng.permutation(n)[node]
-    rows = np.lexsort((direction, order))
+    sprung_on = replace(case, matrix=sp.csr_array(case.matrix + sp.csr_array(total.reshape(n * d, -1))))
+    truth = truth_of(replace(body, case=sprung_on))
+    rows = np.lexsort((truth.direction, rng.permutation(n)[truth.node]))
     rows = rows[keep.ravel()[rows]]
     return truth.kept(rows) if len(rows) > 3 else hanging(rng)
 
