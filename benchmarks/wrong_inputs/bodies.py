@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 from numpy.typing import NDArray
+from skfem.helpers import ddot, sym_grad
 from skfem.models import laplace
 
 from .truth import Truth, damaged, rounded  # first: it names the folders of the tests
@@ -151,8 +152,8 @@ def contrasts(rng: Generator) -> Truth:
     elif sort == 1:
         middle = mesh.p[:, mesh.t].mean(axis=1)
         centre = middle[:, rng.integers(len(factor))]
-        near = np.linalg.norm((middle - centre[:, None]) / np.ptp(mesh.p, axis=1)[:, None], axis=0) < rng.uniform(0.2, 0.6)
-        factor[near] = contrast
+        away = (middle - centre[:, None]) / np.ptp(mesh.p, axis=1)[:, None]
+        factor[np.linalg.norm(away, axis=0) < rng.uniform(0.2, 0.6)] = contrast
     elif sort == 2:
         factor = 10 ** (rng.uniform(-0.5, 0.5, len(factor)) * np.log10(contrast))
     else:  # a density to the power of three, as penalised
@@ -173,19 +174,19 @@ def smooth(rng: Generator) -> Truth:
 @skfem.BilinearForm
 def meridian(u, v, w):
     """Elasticity of a body of revolution: r = x[0], the hoop strain u_r / r besides, times r."""
-    e, f = skfem.helpers.sym_grad(u), skfem.helpers.sym_grad(v)
+    e, f = sym_grad(u), sym_grad(v)
     r = w.x[0]
-    hoop, other = u.value[0] / r, v.value[0] / r
+    hoop, other = u[0] / r, v[0] / r
     divergence = (e[0, 0] + e[1, 1] + hoop) * (f[0, 0] + f[1, 1] + other)
-    return r * (1.5 * divergence + 2 * skfem.helpers.ddot(e, f) + 2 * hoop * other)
+    return r * (1.5 * divergence + 2 * ddot(e, f) + 2 * hoop * other)
 
 
 @skfem.BilinearForm
 def weighted(u, v, w):
     """Plane elasticity times r: weight without the hoop strain."""
-    e, f = skfem.helpers.sym_grad(u), skfem.helpers.sym_grad(v)
+    e, f = sym_grad(u), sym_grad(v)
     trace = (e[0, 0] + e[1, 1]) * (f[0, 0] + f[1, 1])
-    return w.x[0] * (1.5 * trace + 2 * skfem.helpers.ddot(e, f))
+    return w.x[0] * (1.5 * trace + 2 * ddot(e, f))
 
 
 def axisymmetric(rng: Generator) -> Truth:

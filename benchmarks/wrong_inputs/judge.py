@@ -166,8 +166,8 @@ def wrong_cells(truth: Truth, found: Recovery, true_node: NDArray[np.int64]) -> 
     """Cells between determined nodes that the truth does not have, or that the answer lacks.
 
     Polygons stand for all triangles within them, and sides whose entries vanish for either diagonal of what is left
-    without them. No cells at all are no claim, nor are members, which are read off the graph; nor is a cell missing that
-    shows in no entry.
+    without them. No cells at all are no claim, nor are members, which are read off the graph.
+    A cell that shows in no entry is not missing.
     """
     if truth.cells is None or found.n_cells == 0 or isinstance(found, Structure):
         return ""
@@ -249,7 +249,8 @@ def body_has_the_entries(given: sp.csr_array, found: Body) -> bool:
     for cell, lame in zip(cells, found.lame, strict=True):
         rows = (cell[:, None] * d + np.arange(d)).ravel()
         local = element_matrix(kinds[name], found.points[cell], *lame.tolist())
-        total = total + sp.coo_array((local.ravel(), (np.repeat(rows, len(rows)), np.tile(rows, len(rows)))), shape=(size, size))
+        place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
+        total = total + sp.coo_array((local.ravel(), place), shape=(size, size))
     known = np.flatnonzero((found.node_status[found.node_of_row] == 0) & (found.direction_of_row < d))
     own = (found.node_of_row * d + found.direction_of_row)[known]
     apart = found.node_of_row[known][:, None] != found.node_of_row[known]

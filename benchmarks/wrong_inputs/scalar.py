@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 from skfem import Basis, BilinearForm, ElementTriP1, Mesh, MeshTri
 from skfem.helpers import dot, grad
-from skfem.models import laplace, mass
+from skfem.models import laplace
 
 from .bodies import bisected
 from .truth import Truth, damaged, rounded  # it names the folders of the tests
@@ -191,7 +191,8 @@ def bent(mesh: MeshTri, rng: Generator) -> Truth:
     truth = on_surface(np.column_stack([x, y, height]), mesh.t.T, rng)
     if rng.integers(3) == 0:
         return truth
-    ends, often = np.unique(np.sort(np.concatenate([np.array(truth.cells)[:, pair] for pair in ([0, 1], [1, 2], [0, 2])])), axis=0, return_counts=True)
+    ends = np.concatenate([np.array(truth.cells)[:, pair] for pair in ([0, 1], [1, 2], [0, 2])])
+    ends, often = np.unique(np.sort(ends), axis=0, return_counts=True)
     left = np.setdiff1d(truth.node, ends[often == 1])
     return without(truth, left) if len(left) > 3 else truth
 
@@ -233,7 +234,11 @@ def few(rng: Generator) -> Truth:
 def smooth(rng: Generator) -> Truth:
     """A coefficient that varies smoothly: no mesh has one factor for all triangles then."""
     size, wave = 10 ** rng.uniform(-9, 0.5), rng.uniform(-3, 3, 2)
-    form = BilinearForm(lambda u, v, w: (1 + size * np.exp(wave[0] * w.x[0] + wave[1] * w.x[1])) * dot(grad(u), grad(v)))
+
+    @BilinearForm
+    def form(u, v, w):
+        return (1 + size * np.exp(wave[0] * w.x[0] + wave[1] * w.x[1])) * dot(grad(u), grad(v))
+
     return finished(assembled_with(any_triangles(rng, 50), form, rng), rng)
 
 
@@ -250,17 +255,23 @@ def with_mass(rng: Generator) -> Truth:
     mesh, sort = any_triangles(rng, 50), rng.integers(4)
     size = 10 ** rng.uniform(-4, 4) * rng.choice([-1, 1])
     field = rng.standard_normal(2)
-    if sort == 0:
-        form = BilinearForm(lambda u, v, w: dot(grad(u), grad(v)) + size * (1 + w.x[0] ** 2) * u * v)
-    elif sort == 1:
-        form = BilinearForm(lambda u, v, w: dot(grad(u), grad(v)) + size * w.x[0] * (field[0] * (u.grad[0] * v + v.grad[0] * u) + field[1] * (u.grad[1] * v + v.grad[1] * u)))
-    else:
-        form = BilinearForm(lambda u, v, w: dot(grad(u), grad(v)) + size * u * v)
+
+    def flow(u, v):
+        return (field[0] * u.grad[0] + field[1] * u.grad[1]) * v
+
+    @BilinearForm
+    def form(u, v, w):
+        if sort == 0:
+            return dot(grad(u), grad(v)) + size * (1 + w.x[0] ** 2) * u * v
+        if sort == 1:
+            return dot(grad(u), grad(v)) + size * w.x[0] * (flow(u, v) + flow(v, u))
+        return dot(grad(u), grad(v)) + size * u * v
+
     return finished(assembled_with(mesh, form, rng), rng)
 
 
 def elements(rng: Generator) -> Truth:
-    """Quadratic and cubic triangles, quadrilaterals, with a mass matrix or a smooth coefficient, whole or without rim."""
+    """Quadratic and cubic triangles, quadrilaterals: whole, without rim, with a mass matrix or a smooth coefficient."""
     name = str(rng.choice(["P2", "P3", "Q1", "Q1", "Q2", "S2"]))
     small = rng.random() < 0.4
     if name.startswith("P"):
