@@ -80,7 +80,7 @@ def misplaced(x: NDArray, y: NDArray) -> float:
     return float(np.linalg.norm(fit - y, axis=1).max() / max(np.linalg.norm(np.ptp(y, axis=0)), 1e-300))
 
 
-def gives_back(found, matrix: Any) -> bool:
+def gives_back(found, matrix: Any, misfit: float = MISFIT) -> bool:
     """Whether elements on the cells, one factor in each piece or region, give the entries of determined rows."""
     linear = not isinstance(found, ConformingMesh)
     cells = {"triangle": found.divided()[0]} if linear else found.cells
@@ -97,7 +97,7 @@ def gives_back(found, matrix: Any) -> bool:
         total = total + part * (found.scale[k] / max(np.abs(given).max(), 1e-300) if shared else ratio(part, off))
     size = np.maximum(np.abs(given).max(axis=1).toarray().ravel(), 1e-300)
     lost = (np.abs(given.sum(axis=1)) > MISFIT * size) & (getattr(found, "n_entries", 1) == 0)  # else all are claimed
-    return agree(off, total, found.node_status == 0, cells, lost)
+    return agree(off, total, found.node_status == 0, cells, lost, misfit)
 
 
 def ratio(part: sp.csr_array, off: sp.csr_array) -> float:
@@ -109,7 +109,12 @@ def ratio(part: sp.csr_array, off: sp.csr_array) -> float:
 
 
 def agree(
-    off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_], cells: dict[str, NDArray], lost: NDArray[np.bool_]
+    off: sp.csr_array,
+    total: sp.csr_array,
+    known: NDArray[np.bool_],
+    cells: dict[str, NDArray],
+    lost: NDArray[np.bool_],
+    misfit: float = MISFIT,
 ) -> bool:
     """Whether entries between rows that are claimed are the same, relative to their rows.
 
@@ -119,7 +124,7 @@ def agree(
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
     row, column = difference.coords
-    wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
+    wrong = np.abs(difference.data) > misfit * np.minimum(largest[row], largest[column])
     lost = lost | ((off != 0) @ (~known).astype(int) > 0)
     shared = cells_of_pairs(cells, off.shape)
     if any(some.shape[1] > 4 for some in cells.values()):  # nodes on sides need not be coupled to those that are gone
@@ -136,7 +141,7 @@ def cells_of_pairs(cells: dict[str, NDArray], shape: tuple[int, int]) -> sp.csr_
     return sp.coo_array((np.ones(len(ends)), ends.T), shape=shape).tocsr()
 
 
-def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
+def lengths_give_back(found: Surface, matrix: sp.csr_array, misfit: float = MISFIT) -> bool:
     """Whether triangles with these sides, each laid flat by itself, give the entries of claimed rows."""
     length = sp.coo_array((found.edge_lengths, found.edges.T), shape=matrix.shape).tocsr()
     length = length + length.T
@@ -150,7 +155,7 @@ def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
     total = sp.coo_array((part.data * factor, (rows[part.row], rows[part.col])), shape=matrix.shape).tocsr()
     off, total = (sp.csr_array(one - sp.diags_array(one.diagonal())) for one in (matrix, total))
     nothing = np.zeros(len(off.indptr) - 1, dtype=bool)
-    return agree(off, total, found.node_status == 0, {"triangle": found.triangles}, nothing)
+    return agree(off, total, found.node_status == 0, {"triangle": found.triangles}, nothing, misfit)
 
 
 def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
