@@ -12,6 +12,7 @@ from wrong_inputs.bodies import body_on, box, truth_of
 from wrong_inputs.judge import fault_of, has_the_entries, outcome_of
 from wrong_inputs.scalar import assembled_with, triangulated
 
+from handmade import verdict
 from unassemble import RecoveryError, recover
 
 EACH = {"structure": 22, "body": 14, "scalar": 6, "surface": 10}  # how many of each kind of a family
@@ -95,7 +96,7 @@ def test_a_point_that_is_moved_is_wrong(kind, want):
     loose[known[0]] = 1
     lost = replace(found, points=points, node_status=loose)
     assert not fault_of(truth, lost)  # nothing is claimed of it
-    assert outcome_of(truth, replace(found, points=points, status="uncertified"))[0] == "uncertified"
+    assert outcome_of(truth, replace(found, points=points, verdict=verdict("uncertified")))[0] == "uncertified"
 
 
 def triangles_alone(truth, found):
@@ -160,10 +161,11 @@ def test_another_mesh_with_the_same_entries_is_named_and_not_proved():
         found = recover(truth.matrix, **truth.options)
         if found.status == "certified" and fault_of(truth, found) and has_the_entries(truth.matrix, found):
             break
-    assert outcome_of(truth, replace(found, uniqueness="proved"))[0] == "WRONG"
-    assert outcome_of(truth, replace(found, uniqueness="searched", warnings=()))[0] == "WRONG"
+    searched = replace(found.verdict, uniqueness="searched")
+    assert outcome_of(truth, replace(found, verdict=replace(found.verdict, uniqueness="proved")))[0] == "WRONG"
+    assert outcome_of(truth, replace(found, verdict=searched, warnings=()))[0] == "WRONG"
     named = ("other surfaces have the same entries",)
-    assert outcome_of(truth, replace(found, uniqueness="searched", warnings=named))[0] == "alias"
+    assert outcome_of(truth, replace(found, verdict=searched, warnings=named))[0] == "alias"
 
 
 @pytest.mark.parametrize("kind", ["square", "points"])
