@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..certificate import BodyCertificate, certify_body, certify_positions
 from ..elements.surface import fields_of
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
@@ -22,7 +23,16 @@ from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, WEAK_AND_UNKNOWN, hidden_elements, no_positions, verdict
+from .verdict import (
+    NOTHING_CHECKED,
+    RESTS_ON_PLANES,
+    WEAK_AND_UNKNOWN,
+    contrast,
+    hidden_elements,
+    no_positions,
+    not_given_back,
+    verdict,
+)
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -96,7 +106,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         (loose.all(), NOTHING_CHECKED),
         (any(map(_flat, bodies)), Reason("the points lie in one line or plane, and no solid body does")),
         (found.hidden > 0, hidden_elements(found.hidden)),
-        (alone and cells and _contrast(nodal) > 1 / ALIKE, WEAK_AND_UNKNOWN),
+        (alone and cells and contrast(nodal) > 1 / ALIKE, WEAK_AND_UNKNOWN),
         ((shear <= ALIKE * bulk).any(), Reason("elements have no shear stiffness: any vectors that cancel are such")),
     ):
         if status == "certified" and against:
@@ -115,22 +125,34 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         shared["warnings"] += (other,)
         shared["uniqueness"] = shared["uniqueness"] and "ambiguous"
     lame, scale = _in_units(shown, component, factor, nodal.dim)
+    certificate = _certificate(request, rows, shared["points"], shown, lame)
+    if np.isfinite(certificate.backward_error):
+        reported = certificate.backward_error
+    else:
+        reported = found.backward_error if found.certified else error
+    if shared["status"] == "certified" and certificate.backward_error > max(CERTIFIED, spread):
+        reason = not_given_back(certificate)
+        shared |= {"status": "uncertified", "uniqueness": None, "reason": reason.text, "advice": reason.advice}
     return Body(
         **fields_of(shown.blocks),
         **shared,
         scale=scale,
         operator="elasticity",
-        backward_error=found.backward_error if found.certified else error,
+        backward_error=reported,
         position_error=bar.error if bar and bar.explained else None,
         poisson_ratio=None if ratio is None else poisson_ratio(ratio),
         lame=lame,
     )
 
 
-def _contrast(nodal: NodalMatrix) -> float:
-    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
-    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[nodal.node] > 0) & (nodal.size[nodal.indices] > 0)
-    return float((nodal.size[nodal.node[live]] / nodal.size[nodal.indices[live]]).max(initial=1.0))
+def _certificate(
+    request: Request, rows: Numbering, points: NDArray[np.float64], found: Cells, lame: NDArray[np.float64]
+) -> BodyCertificate:
+    """The certificate of the body as it is written: of its elements, or of the positions where none re-assemble."""
+    matrix = request.rounding.exact if request.rounding else request.matrix.csr()
+    if found.certified and len(lame):
+        return certify_body(matrix, rows.node_of_row, rows.direction_of_row, points, found.blocks, lame)
+    return certify_positions(matrix, rows.node_of_row, rows.direction_of_row, points)
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:

@@ -7,11 +7,12 @@ from itertools import chain
 import numpy as np
 import scipy.sparse as sp
 
+from ..certificate import BodyCertificate
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import CERTIFIED
+from ..tolerances import CERTIFIED, SMALL
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
 from .nullspace.placing import Solution
@@ -40,6 +41,13 @@ def hidden_elements(count: int) -> Reason:
     return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
+def not_given_back(certificate: BodyCertificate) -> Reason:
+    """That the body as written does not give the rows of the matrix back."""
+    rows = count_of(len(np.unique(certificate.worst(len(certificate.misfits))[0])), "row")
+    error = certificate.backward_error
+    return Reason(f"{rows} of the matrix are not given back by the body as it is written: the error is {error:.1e}")
+
+
 def verdict(
     nodal: NodalMatrix,
     solution: Solution,
@@ -62,7 +70,8 @@ def verdict(
     if shown:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         sure = f"the matrix re-assembled on the {count} is the given one"
-        objection = objection or (_soft(solution) if error > _MAGNIFIED * _softest(solution) else None)
+        soft = error > _MAGNIFIED * _softest(solution) and contrast(nodal) > 1 / SMALL
+        objection = objection or (_soft(solution) if soft else None)
     elif rounding and known:
         sure = holds + known.within(rounding)
         objection = objection or known.objection(error, rounding, holds)
@@ -74,6 +83,13 @@ def verdict(
         more = f"write more digits of the entries: they are rounded to {rounding.name}, which may hide what rows lack"
         objection = replace(objection, advice=more)
     return ("uncertified", objection) if objection else ("certified", Reason(sure))
+
+
+def contrast(nodal: NodalMatrix) -> float:
+    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
+    i, j = nodal.node, nodal.indices
+    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[i] > 0) & (nodal.size[j] > 0)
+    return float((nodal.size[i[live]] / nodal.size[j[live]]).max(initial=1.0))
 
 
 def _softest(solution: Solution) -> float:
