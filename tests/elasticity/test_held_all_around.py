@@ -192,4 +192,4 @@ def test_several_supports_on_all_sides(kind, perturb):
     verdict = judged(found, truth)
     assert found.certified
     assert verdict.error < 1e-8
-    assert verdict.missing < 0.35  # next to the clamp, for quadratic elements, and beside penalties
+    assert verdict.missing < 0.4  # next to the clamp, for quadratic elements, and beside penalties

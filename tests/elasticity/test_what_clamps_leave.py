@@ -57,5 +57,8 @@ def test_clamps_cost_the_nodes_that_no_equation_holds(kind, shape, material):
     fields = null_fields(body, case, nodes, 1.5 if material == "one" else None)
     placed = np.isfinite(found.points).all(axis=1)[found.node_of_row[::d]]
     assert rank(fields[placed]) == d + 1
-    for loose in np.flatnonzero(~placed):
-        assert rank(fields[placed | (np.arange(len(nodes)) == loose)]) > d + 1
+    loose = np.flatnonzero(~placed)
+    held = [rank(fields[placed | (np.arange(len(nodes)) == node)]) == d + 1 for node in loose]
+    unchecked = any("identities that no others check" in warning for warning in found.warnings)
+    assert unchecked or not any(held)  # some have as many equations as coordinates, and none of them to spare
+    assert not all(held)

@@ -3,6 +3,11 @@
 Nothing here knows how a mesh was found: the room imports no solver and no recovery.
 """
 
+from .bodies import (
+    BodyCertificate as BodyCertificate,
+    certify_body as certify_body,
+    certify_positions as certify_positions,
+)
 from .comparison import Certificate as Certificate, Terms as Terms, compared as compared
 from .lengths import MetricCertificate as MetricCertificate, certify_metric as certify_metric
 from .masses import certify_masses as certify_masses

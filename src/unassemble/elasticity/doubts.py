@@ -12,7 +12,7 @@ from ..nodes.numbering import Numbering
 from ..tolerances import ALIKE
 from ..words import count_of
 from .materials.cells import Cells
-from .nullspace.checked import checked
+from .nullspace.checked import checked, checked_beside
 from .nullspace.placing import Solution
 
 
@@ -57,7 +57,8 @@ def unchecked(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[n
     twice = np.zeros(nodal.n, dtype=bool)
     twice[known] = _coinciding(solution.points[known])
     whole = valid_pairs(nodal).all(axis=(1, 2))
-    return outside & (~checked(nodal, solution) | twice & ~whole)
+    sure = checked(nodal, solution) if outside[known].all() else checked_beside(nodal, solution, outside)
+    return outside & (~sure | twice & ~whole)
 
 
 def _coinciding(points: NDArray[np.float64]) -> NDArray[np.bool_]:

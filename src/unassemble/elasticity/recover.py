@@ -1,12 +1,12 @@
 """Coordinates from an elasticity matrix: the whole room on one page."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..certificate import Findings
+from ..certificate import BodyCertificate, Findings, certify_body, certify_positions
 from ..elements.surface import fields_of
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
@@ -14,7 +14,7 @@ from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
-from ..recovery import Body, Examined, Placed, Residual, finish
+from ..recovery import Body, Examined, Placed, finish
 from ..tolerances import ALIKE, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
@@ -23,7 +23,16 @@ from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
-from .verdict import NOTHING_CHECKED, RESTS_ON_PLANES, WEAK_AND_UNKNOWN, examined, hidden_elements, no_positions
+from .verdict import (
+    NOTHING_CHECKED,
+    RESTS_ON_PLANES,
+    WEAK_AND_UNKNOWN,
+    contrast,
+    examined,
+    hidden_elements,
+    no_positions,
+    not_given_back,
+)
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
@@ -100,7 +109,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         objections.append(Reason("the points lie in one line or plane, and no solid body does"))
     if found.hidden > 0:
         objections.append(hidden_elements(found.hidden))
-    if alone and cells and _contrast(nodal) > 1 / ALIKE:
+    if alone and cells and contrast(nodal) > 1 / ALIKE:
         objections.append(WEAK_AND_UNKNOWN)
     if (shear <= ALIKE * bulk).any():
         objections.append(Reason("elements have no shear stiffness: any vectors that cancel are such"))
@@ -117,6 +126,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
             sure,
             advice=GIVE_NUMBERING,
         )
+    allowed = max(CERTIFIED, spread)
 
     def place() -> Placed[Body]:
         moved = anchored(request, rows, placed, component, 1.0, free=free)
@@ -133,18 +143,45 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         )
         return Placed(body, (*request.matrix.warnings, *said, *moved.notes))
 
-    def examine(_: Body, compared: Residual) -> Examined:
-        allowed = np.inf if rounding else CERTIFIED
+    def compare(body: Body) -> BodyComparison:
+        fit = found.backward_error if found.certified else error
+        return BodyComparison(_certificate(request, body, elements=found.certified), fit)
+
+    def examine(_: Body, compared: BodyComparison) -> Examined:
+        if not objections and not compared.certificate.backward_error <= allowed:
+            objections.append(not_given_back(compared.certificate))
         return Examined(Findings((sure,), compared.backward_error, tuple(objections), another, allowed=allowed))
 
-    held = Residual(found.backward_error if found.certified else error)
-    return finish(request.clock, place, lambda _: held, examine)
+    return finish(request.clock, place, compare, examine)
 
 
-def _contrast(nodal: NodalMatrix) -> float:
-    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
-    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[nodal.node] > 0) & (nodal.size[nodal.indices] > 0)
-    return float((nodal.size[nodal.node[live]] / nodal.size[nodal.indices[live]]).max(initial=1.0))
+@dataclass(frozen=True, eq=False)
+class BodyComparison:
+    """A body as it is written, compared with its matrix."""
+
+    certificate: BodyCertificate
+    fit: float  # what the fit that found the body left
+
+    @property
+    def backward_error(self) -> float:
+        """That of the certificate or, of a body of which it can compare nothing, that of the fit."""
+        error = self.certificate.backward_error
+        return error if np.isfinite(error) else self.fit
+
+    def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The entries that fit worst, and their misfits."""
+        return self.certificate.worst(count)
+
+
+def _certificate(request: Request, body: Body, *, elements: bool) -> BodyCertificate:
+    """The certificate of the body as it is written: of its elements, or of the positions where none re-assemble."""
+    matrix = request.rounding.exact if request.rounding else request.matrix.csr()
+    assert body.node_of_row is not None
+    assert body.direction_of_row is not None
+    given = matrix, body.node_of_row, body.direction_of_row, body.points
+    if elements and len(body.lame):
+        return certify_body(*given, body.cells, body.lame)
+    return certify_positions(*given)
 
 
 def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 
+from ..certificate import BodyCertificate
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import CERTIFIED
+from ..tolerances import CERTIFIED, SMALL
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
 from .nullspace.placing import Solution
@@ -40,6 +41,13 @@ def hidden_elements(count: int) -> Reason:
     return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
+def not_given_back(certificate: BodyCertificate) -> Reason:
+    """That the body as written does not give the rows of the matrix back."""
+    rows = count_of(len(np.unique(certificate.worst(len(certificate.misfits))[0])), "row")
+    error = certificate.backward_error
+    return Reason(f"{rows} of the matrix are not given back by the body as it is written: the error is {error:.1e}")
+
+
 def examined(
     nodal: NodalMatrix,
     solution: Solution,
@@ -62,7 +70,8 @@ def examined(
     if shown:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         sure = f"the matrix re-assembled on the {count} is the given one"
-        objections += [_soft(solution)] if error > _MAGNIFIED * _softest(solution) else []
+        soft = error > _MAGNIFIED * _softest(solution) and contrast(nodal) > 1 / SMALL
+        objections += [_soft(solution)] if soft else []
     elif rounding and known:
         sure = holds + known.within(rounding)
         objections += known.objections(error, rounding, holds)
@@ -74,6 +83,13 @@ def examined(
         more = f"write more digits of the entries: they are rounded to {rounding.name}, which may hide what rows lack"
         objections[0] = objections[0].but(advice=more)
     return sure, objections
+
+
+def contrast(nodal: NodalMatrix) -> float:
+    """How many times the rows of one node are larger than those of another to which it is coupled, at most."""
+    i, j = nodal.node, nodal.indices
+    live = (nodal.data != 0).any(axis=(1, 2)) & (nodal.size[i] > 0) & (nodal.size[j] > 0)
+    return float((nodal.size[i[live]] / nodal.size[j[live]]).max(initial=1.0))
 
 
 def _softest(solution: Solution) -> float:

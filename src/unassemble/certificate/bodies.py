@@ -1,0 +1,268 @@
+"""Elastic bodies: the matrix re-assembled on the body as written, or rigid motions and identities asked of its points.
+
+Which entries a list of cells has to explain is read off the matrix: a node is surrounded if its rows annihilate the
+translations, and if all that they couple to has a position. All cells around such
+a node have to be there, and so every entry of its rows is that of the cells.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..budget import AT_ONCE
+from ..tolerances import CANCELLED, CERTIFIED
+from .comparison import relative
+from .solids import Rule, rules_of, stiffness
+
+
+@dataclass(frozen=True, eq=False)
+class BodyCertificate:
+    """How well a body explains the rows of a matrix, (N, N)."""
+
+    # largest difference between an entry and the re-assembled one, or what a row leaves of an identity over the
+    # distance of the farthest node to which it is coupled, relative to the largest entry between nodes of the row, of
+    # two rows the smaller; NaN where nothing was compared
+    backward_error: float
+    pairs: NDArray[np.int64]  # (k, 2) rows and columns that were compared; for identities the row and itself
+    misfits: NDArray[np.float64]  # (k,) of each, relative in this way
+    compared: NDArray[np.bool_]  # (N,) rows all of whose entries were
+    unexplained: NDArray[np.int64]  # (u,) of these, rows that are not given back
+
+    def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The pairs that fit worst, worst first, and their misfits: those above the bound."""
+        above = np.flatnonzero(self.misfits > CERTIFIED)
+        order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
+        return self.pairs[order], self.misfits[order]
+
+
+def certify_body(
+    matrix: sp.csr_array,
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+    points: NDArray[np.float64],
+    blocks: Mapping[str, NDArray[np.int64]],
+    lame: NDArray[np.float64],
+) -> BodyCertificate:
+    """Re-assemble isotropic elasticity on cells and compare all entries of rows around which all cells are there.
+
+    `node_of_row` and `direction_of_row` (N,) with -1 for rows whose direction is not known; `points` (n, d), NaN for
+    nodes without a position; `blocks` cells (m, k) by meshio's names and in its order; `lame` lambda and mu (m, 2) of
+    all of them one after the other. Of quadrature rules the one that fits best counts: a mesh does not tell it.
+    """
+    n, d = points.shape
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    row_of = np.full(n * d, -1)
+    named = (direction_of_row >= 0) & (_row_sizes(matrix, node_of_row) > 0)  # rows of the identity are none
+    row_of[node_of_row[named] * d + direction_of_row[named]] = np.flatnonzero(named)
+    compared = _surrounded(matrix, node_of_row, direction_of_row, known, d)
+    matrix = _without_springs(matrix, node_of_row, direction_of_row, compared)
+    size = _row_sizes(matrix, node_of_row)
+    penalty = _penalised(matrix, node_of_row)
+    given = matrix.tocoo()
+    best: BodyCertificate | None = None
+    names = list(blocks)
+    rich = next((name for name in names if name not in ("triangle", "tetra")), names[0] if names else "")
+    usual = {name: next(rules_of(name)) for name in names}
+    for rule in rules_of(rich) if names else ():
+        assembled = _assembled(row_of, points, blocks, lame, usual | {rich: rule}, len(node_of_row)).tocoo()
+        found = _compared(given, assembled, compared, penalty, size)
+        if best is None or not best.backward_error <= found.backward_error:
+            best = found
+        if best.backward_error <= CERTIFIED:
+            break
+    return best if best is not None else _nothing(len(node_of_row))
+
+
+def certify_positions(
+    matrix: sp.csr_array,
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+    points: NDArray[np.float64],
+) -> BodyCertificate:
+    """Ask rows that annihilate translations for what isotropic elasticity does to linear fields, of any element.
+
+    The force of a row of direction c, where each node moves along b by its coordinate x_a, is
+
+        F_cba = delta_ab p_c + delta_ac q_b + delta_cb q_a
+
+    with two vectors p and q of each node, the integrals of lambda and of mu times the gradient of its shape function.
+    Each component is read off one force, p_b off F_baa and q_b off F_aba with another axis a, and all of F is held
+    against them. That rigid rotations cause no forces is among it: F_cba = F_cab. Arguments as those of
+    :func:`certify_body`.
+    """
+    n, d = points.shape
+    order = len(node_of_row)
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    compared = _surrounded(matrix, node_of_row, direction_of_row, known, d)
+    matrix = _without_springs(matrix, node_of_row, direction_of_row, compared)
+    rows = np.flatnonzero(compared & ~_penalised(matrix, node_of_row))
+    nodes = np.unique(node_of_row[rows])
+    nodes = nodes[np.bincount(node_of_row[rows], minlength=n)[nodes] == d]
+    rows = rows[np.isin(node_of_row[rows], nodes)]
+    if not len(rows):
+        return _nothing(order)
+    some = sp.csr_array(matrix[rows]).tocoo()
+    own = node_of_row[rows]
+    away = points[node_of_row[some.col]] - points[own[some.row]]  # coordinates seen from the node of the row
+    force = np.zeros((len(rows), d, d))  # by row, the axis along which nodes move, and the coordinate by which
+    for a in range(d):
+        np.add.at(force[:, :, a], (some.row, direction_of_row[some.col]), some.data * away[:, a])
+    far = np.zeros(len(rows))
+    np.maximum.at(far, some.row, np.linalg.norm(away, axis=1))
+    size = _row_sizes(matrix, node_of_row)[rows] * far
+    full = np.zeros((n, d, d, d))
+    unit = np.ones((n, d))
+    full[own, direction_of_row[rows]] = force
+    unit[own, direction_of_row[rows]] = size
+    full, unit = full[nodes], unit[nodes]
+    p = np.stack([full[:, b, (b + 1) % d, (b + 1) % d] for b in range(d)], axis=1)
+    q = np.stack([full[:, (b + 1) % d, b, (b + 1) % d] for b in range(d)], axis=1)
+    one = np.eye(d)
+    expected = np.einsum("ab,nc->ncba", one, p) + np.einsum("ac,nb->ncba", one, q) + np.einsum("cb,na->ncba", one, q)
+    smallest = np.minimum(unit[:, :, None], unit[:, None, :])  # p and q come from other rows of the node
+    misfit = relative(full - expected, smallest.min(axis=2)[:, :, None, None]).max(axis=(2, 3))
+    by_row = np.zeros((n, d))
+    by_row[nodes] = misfit
+    misfits = by_row[own, direction_of_row[rows]]
+    asked = np.zeros(order, dtype=bool)
+    asked[rows] = True
+    return BodyCertificate(
+        float(misfits.max(initial=0.0)), np.column_stack([rows, rows]), misfits, asked, rows[misfits > CERTIFIED]
+    )
+
+
+def _nothing(order: int) -> BodyCertificate:
+    """The certificate of what nothing was compared with."""
+    return BodyCertificate(
+        float("nan"), np.empty((0, 2), np.int64), np.empty(0), np.zeros(order, dtype=bool), np.empty(0, np.int64)
+    )
+
+
+def _row_sizes(matrix: sp.csr_array, node_of_row: NDArray) -> NDArray[np.float64]:
+    """(N,) largest entry of each row with another node."""
+    entry = matrix.tocoo()
+    apart = node_of_row[entry.row] != node_of_row[entry.col]
+    size = np.zeros(matrix.shape[0])
+    np.maximum.at(size, entry.row[apart], np.abs(entry.data[apart]))
+    return size
+
+
+def _penalised(matrix: sp.csr_array, node_of_row: NDArray) -> NDArray[np.bool_]:
+    """(N,) rows that do not add up to zero over all unknowns, as with a support on the diagonal."""
+    total = np.asarray(matrix.sum(axis=1)).ravel()
+    entry = matrix.tocoo()
+    apart = node_of_row[entry.row] != node_of_row[entry.col]
+    size = np.bincount(entry.row[apart], np.abs(entry.data[apart]), matrix.shape[0])
+    return np.asarray(np.abs(total) > CANCELLED * size)
+
+
+def _surrounded(
+    matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray, known: NDArray[np.bool_], d: int
+) -> NDArray[np.bool_]:
+    """(N,) rows of nodes that have all d rows and a position, and so have all that these couple to.
+
+    Their entries add up to zero in each direction, as those of rows with a support on the diagonal do not.
+    """
+    order, n = len(node_of_row), len(known)
+    named = (direction_of_row >= 0) & (_row_sizes(matrix, node_of_row) > 0)
+    whole = known & (np.bincount(node_of_row[named], minlength=n) == d)
+    entry = matrix.tocoo()
+    keep = (direction_of_row[entry.col] >= 0) & (entry.row != entry.col)
+    sums = np.zeros((order, d))
+    np.add.at(sums, (entry.row[keep], direction_of_row[entry.col[keep]]), entry.data[keep])
+    apart = node_of_row[entry.row] != node_of_row[entry.col]
+    size = np.bincount(entry.row[apart], np.abs(entry.data[apart]), order)
+    sums[np.arange(order), np.maximum(direction_of_row, 0)] += matrix.diagonal()
+    good = (np.abs(sums) <= CANCELLED * size[:, None]).all(axis=1) & (size > 0) & (direction_of_row >= 0)
+    good &= np.bincount(entry.row, ~whole[node_of_row[entry.col]] & (entry.data != 0), order) == 0
+    all_good = np.bincount(node_of_row, good, minlength=n) == d
+    return np.asarray(all_good[node_of_row] & good)
+
+
+def _without_springs(
+    matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray, compared: NDArray[np.bool_]
+) -> sp.csr_array:
+    """The matrix without blocks of two nodes that no third couples to, and without what they add to the diagonal.
+
+    A spring adds a block to the rows of its two nodes and takes it off between them. Two nodes of a cell are coupled
+    to its other nodes, all of which are there around nodes of which one is `compared`, by its rows (N,).
+    """
+    entry, n = matrix.tocoo(), int(node_of_row.max(initial=-1)) + 1
+    i, j = node_of_row[entry.row], node_of_row[entry.col]
+    live = (entry.data != 0) & (i != j)
+    near = sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(n, n))
+    near.data[:] = 1
+    third = sp.csr_array((near @ near).multiply(near)) > 0
+    pair = np.unique(i[live] * n + j[live])
+    a, b = third.nonzero()
+    surrounded = np.zeros(n, dtype=bool)
+    surrounded[node_of_row[compared]] = True
+    alone = np.setdiff1d(pair, a.astype(np.int64) * n + b)
+    alone = alone[surrounded[alone // n] | surrounded[alone % n]]
+    springs = live & np.isin(i * n + j, alone) & (direction_of_row[entry.row] >= 0)
+    if not springs.any() or n <= 2:
+        return matrix
+    place = np.full((n, int(direction_of_row.max()) + 1), -1)
+    place[node_of_row, np.maximum(direction_of_row, 0)] = np.arange(len(node_of_row))
+    row, column, value = entry.row[springs], entry.col[springs], entry.data[springs]
+    own = place[node_of_row[row], direction_of_row[column]]
+    there = own >= 0
+    moved = sp.coo_array(
+        (
+            np.concatenate([value[there], -value]),
+            (np.concatenate([row[there], row]), np.concatenate([own[there], column])),
+        ),
+        shape=matrix.shape,
+    )
+    return sp.csr_array(matrix + moved.tocsr())
+
+
+def _assembled(
+    row_of: NDArray[np.int64],
+    points: NDArray[np.float64],
+    blocks: Mapping[str, NDArray[np.int64]],
+    lame: NDArray[np.float64],
+    rules: Mapping[str, Rule],
+    order: int,
+) -> sp.csr_array:
+    """The matrix (N, N) of cells, by the rows of unknowns (n d,); unknowns that have none are left out."""
+    d, first = points.shape[1], 0
+    total = sp.csr_array((order, order))
+    for name, cells in blocks.items():
+        step = max(AT_ONCE // (cells.shape[1] * d * (cells.shape[1] * d + 6 * len(rules[name][1]))), 1)
+        for start in range(0, len(cells), step):
+            some = cells[start : start + step]
+            unknown = row_of[some[:, :, None] * d + np.arange(d)].reshape(len(some), -1)
+            own = lame[first + start : first + start + len(some)]
+            value = stiffness(name, points[some], own, rules[name])
+            rows, columns = np.broadcast_arrays(unknown[:, :, None], unknown[:, None, :])
+            there = (rows >= 0) & (columns >= 0)
+            part = sp.coo_array((value[there], (rows[there], columns[there])), shape=(order, order))
+            total = sp.csr_array(total + part.tocsr())
+        first += len(cells)
+    return total
+
+
+def _compared(
+    given: sp.coo_array,
+    assembled: sp.coo_array,
+    compared: NDArray[np.bool_],
+    penalty: NDArray[np.bool_],
+    size: NDArray[np.float64],
+) -> BodyCertificate:
+    """All entries of either matrix in rows that are `compared`, (N,), but for diagonals with a `penalty`."""
+    order = len(size)
+    key = np.concatenate([part.row.astype(np.int64) * order + part.col for part in (given, assembled)])
+    value = np.concatenate([-given.data, assembled.data])
+    pairs, place = np.unique(key, return_inverse=True)
+    difference = np.bincount(place, value, len(pairs))
+    row, column = np.divmod(pairs, order)
+    use = (compared[row] | compared[column]) & ~((row == column) & penalty[row])
+    row, column, difference = row[use], column[use], difference[use]
+    misfits = relative(difference, np.minimum(size[row], size[column]))
+    bad = np.unique(row[misfits > CERTIFIED])
+    error = float(misfits.max(initial=0.0)) if len(misfits) else float("nan")
+    return BodyCertificate(error, np.column_stack([row, column]), misfits, compared, bad[compared[bad]])

@@ -1,0 +1,102 @@
+"""The certificate of bodies: the matrix re-assembled on the body as it is written, by elements of its own."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from assembled import ELEMENTS, box, heterogeneous, on_plane, permuted_nodes, stiffness
+
+from unassemble import recover
+from unassemble.certificate import certify_body, certify_positions
+
+COUNTS = {"tri": (5, 6), "qua": (5, 6), "tet": (3, 4, 3), "hex": (3, 4, 3)}
+
+
+def body(kind, **material):
+    return permuted_nodes(stiffness(kind, box(kind, COUNTS[kind[:3]], perturb=0.2), **material), seed=1)
+
+
+def on_the_result(found, matrix, **changed):
+    """The certificate of a result with some of its arrays changed."""
+    arrays = {"points": found.points, "lame": found.lame} | changed
+    matrix, rows = sp.csr_array(matrix), (found.node_of_row, found.direction_of_row)
+    return certify_body(matrix, *rows, arrays["points"], found.cells, arrays["lame"])
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+def test_a_body_at_its_anchors_gives_all_rows_back(kind):
+    """Points in the units and in the place of the anchors, and coefficients in these units."""
+    case = body(kind, lam=1.5)
+    points = 3.7 * case.points + 11.0
+    ends = (0, len(points) - 1)
+    anchors = [(case.dim * node, *points[node]) for node in ends]
+    found = recover(case.matrix, anchors=anchors)
+    assert found.certified, found.reason
+    certificate = on_the_result(found, case.matrix)
+    assert max(certificate.backward_error, found.backward_error) < 1e-11
+    assert certificate.compared.all()
+    assert not len(certificate.unexplained)
+
+
+@pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tet-p1", "hex-q1", "tri-p2"])
+def test_what_is_changed_shows_in_the_rows_that_it_touches(kind):
+    case = body(kind, lam=1.5)
+    found = recover(case.matrix)
+    moved = found.points.copy()
+    moved[7] += 1e-6
+    certificate = on_the_result(found, case.matrix, points=moved)
+    assert certificate.backward_error > 1e-8
+    assert (found.node_of_row[certificate.worst(1)[0]] == 7).any() or len(certificate.unexplained)
+    weaker = found.lame.copy()
+    weaker[3] *= 1 - 1e-6
+    assert on_the_result(found, case.matrix, lame=weaker).backward_error > 1e-8
+    given = sp.lil_array(case.matrix)
+    entries = np.abs(case.matrix[[2]].toarray().ravel())
+    entries[case.dim * (2 // case.dim) :][: case.dim] = 0  # between the node and itself
+    row, column = 2, int(entries.argmax())
+    given[row, column] *= 1 + 1e-6
+    given[column, row] = given[row, column]
+    certificate = on_the_result(found, given)
+    assert not certificate.compared[[row, column]].any()  # no row of theirs adds up to zero any more
+
+
+@pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tet-p1", "hex-q1"])
+def test_a_weak_cell_that_is_left_out_shows(kind):
+    """Each entry is held against its own rows, not against the largest of the matrix."""
+    mesh = box(kind, COUNTS[kind[:3]], perturb=0.2)
+    modulus = np.where(mesh.p[:, mesh.t].mean(axis=1)[0] > 0.6, 1e-6, 1.0)[:, None]
+    case = permuted_nodes(stiffness(kind, mesh, lam=1.5 * modulus, mu=modulus), seed=1)
+    found = recover(case.matrix)
+    assert found.certified
+    (name, cells), *_ = found.cells.items()
+    kept = found.lame[:, 1] > 1e-3 * found.lame[:, 1].max()
+    assert 0 < kept.sum() < len(cells)
+    rows = found.node_of_row, found.direction_of_row
+    certificate = certify_body(case.matrix, *rows, found.points, {name: cells[kept]}, found.lame[kept])
+    assert certificate.backward_error > 1e-2
+    assert len(certificate.unexplained)
+
+
+@pytest.mark.parametrize("kind", ["quad-q1", "tri-p2", "tet-p2", "hex-q1"])
+def test_positions_alone_are_certified_where_material_varies_within_cells(kind):
+    case = body(kind, lam=heterogeneous, mu=lambda x: 1 + x[0] * x[1], within=True)
+    found = recover(case.matrix)
+    assert found.certified
+    rows = found.node_of_row, found.direction_of_row
+    certificate = certify_positions(case.matrix, *rows, found.points)
+    assert max(certificate.backward_error, found.backward_error) < 1e-11
+    assert certificate.compared.all()
+    moved = found.points.copy()
+    moved[5] += 1e-6
+    assert certify_positions(case.matrix, *rows, moved).backward_error > 1e-8
+
+
+def test_rows_next_to_a_clamp_are_not_compared():
+    case = body("quad-q1", lam=1.5)
+    gone = np.repeat(on_plane(case, 0), 2)
+    matrix = case.matrix[~gone][:, ~gone]
+    found = recover(matrix)
+    assert found.certified
+    certificate = on_the_result(found, matrix)
+    assert 0 < certificate.compared.sum() < len(certificate.compared)
+    beside = np.abs(case.matrix[~gone][:, gone]).sum(axis=1) > 0
+    assert not certificate.compared[beside].any()
