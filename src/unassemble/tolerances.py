@@ -18,6 +18,9 @@ SUMMED = 1e-10
 CANCELLED = 1e-9
 """Relative size of what is left of terms that cancel, up to which it is rounding; supports leave 1e-3 and more."""
 
+PENALTY = 1e3
+"""How many times the rest of its row a diagonal entry is, at least, that is a penalty."""
+
 SIGMAS = 10.0
 """Standard deviations that no difference of independent noise exceeds, in a matrix of any size."""
 

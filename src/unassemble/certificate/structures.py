@@ -18,10 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..tolerances import LAST_DIGITS
-
-_WORST = 10  # rows to name
-_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+from ..tolerances import LAST_DIGITS, PENALTY
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +34,6 @@ class StructureCheck:
     def share(self) -> float:
         """Share of all rows that say so."""
         return float(self.rows.mean())
-
-    @property
-    def worst_rows(self) -> NDArray[np.int64]:
-        """A few of the rows that are not explained."""
-        return self.unexplained[:_WORST]
 
     def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """No pairs of rows: single entries of a structure are not told apart."""
@@ -183,7 +175,7 @@ def _forces(
     reached = _determined(x)[node]
     touched = added((~reached[j]).astype(float)) == 0
     diagonal = np.abs(matrix.diagonal())
-    penalised = diagonal > _PENALTY * (added(np.abs(value)) - diagonal)
+    penalised = diagonal > PENALTY * (added(np.abs(value)) - diagonal)
     sound = live & touched & ~penalised
     turning = direction >= moves
     firm = np.ones(len(x), dtype=bool)  # nodes no force of which depends on translations

@@ -4,10 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..tolerances import CANCELLED
+from ..tolerances import CANCELLED, PENALTY
 from .grouping import by_direction, pattern_of
-
-PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
 def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:

@@ -6,8 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..tolerances import CANCELLED
-from .constants import PENALTY
+from ..tolerances import CANCELLED, PENALTY
 from .numbering import Numbering
 
 

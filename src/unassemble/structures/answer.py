@@ -64,7 +64,7 @@ class HeldStructure:
 
 def _most_in(check: StructureCheck) -> str:
     """Which rows the certificate does not explain, in words."""
-    worst = check.worst_rows[:3]
+    worst = check.unexplained[:3]
     if not len(worst):
         return ""
     more = ", ..." if len(check.unexplained) > len(worst) else ""

@@ -7,8 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..nodes.constants import PENALTY
-from ..tolerances import CANCELLED, LAST_DIGITS
+from ..tolerances import CANCELLED, LAST_DIGITS, PENALTY
 from .layouts import Layout
 
 
