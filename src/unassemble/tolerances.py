@@ -56,10 +56,8 @@ NEARLY_ALL = 0.9
 """Share of rows or nodes that right guesses explain, at least, away from supports; some more add up by chance."""
 
 PLACED = 1e-8
-"""How far off positions may be, relative to the size of what is placed, where it is certified."""
-
-FLAT = 1e-8
-"""Radians by which angles about a vertex may miss a full turn where the surface is flat there: rounding leaves less."""
+"""How far off positions may be, relative to the size of what is placed, where it is certified; and angles about a
+vertex, in radians, where a surface is flat."""
 
 # The certificate.
 

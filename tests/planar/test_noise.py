@@ -8,8 +8,7 @@ from arithmetic import perturbed
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
 from unassemble import GeometryError, recover
 from unassemble.matrix import check_matrix
-from unassemble.planar import CAREFUL, conformal_map, count_flipped, polish
-from unassemble.planar.polish import PolishOptions
+from unassemble.planar import CAREFUL, PolishOptions, conformal_map, count_flipped, polish
 from unassemble.topology import surfaces
 
 

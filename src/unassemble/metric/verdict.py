@@ -13,7 +13,7 @@ from ..certificate import Findings, MetricCertificate, chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..tolerances import CERTIFIED, CONFIDENCE, FLAT, LARGEST_NOISE
+from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, PLACED
 from ..topology.manifold import Cycles
 from ..words import Reason, words_of
 from .heron import areas_cotangents, blocks_of, summed
@@ -57,7 +57,7 @@ class Found:
         inside = np.ones(self.mesh.n, dtype=bool)
         inside[self.mesh.edges[self.mesh.boundary]] = False
         curvature = self.mesh.curvature(self.squared)
-        flat = inside & (np.abs(curvature) <= FLAT)
+        flat = inside & (np.abs(curvature) <= PLACED)
         checked = np.unique(self.mesh.piece[flat[self.mesh.triangles].any(axis=1)])
         return bool((flat == (inside & np.isfinite(curvature))).all() and len(checked) == self.mesh.n_pieces)
 

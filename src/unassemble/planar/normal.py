@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import REFINEMENTS
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..tolerances import AGREED, LAST_DIGITS, ROUNDED
@@ -39,10 +40,6 @@ class WeightJacobian(Jacobian):
         vertices, e = piece.stencil.T.astype(np.int32).ravel(), len(piece.edges)
         start = np.arange(0, 4 * e + 1, 4, dtype=np.int32)
         super().__init__(sp.bsr_array((blocks, vertices, start), shape=(e, 2 * len(z))))
-
-
-MOST_CORRECTIONS = 30
-"""Steps of conjugate gradients; two are enough unless the factor has no digit left."""
 
 
 class NormalEquations:
@@ -111,7 +108,7 @@ class NormalEquations:
         left = changes - jacobian.forward(d)
         least = np.linalg.norm(left, axis=0)
         along, before = np.zeros_like(d), np.ones(d.shape[1])
-        for k in range(MOST_CORRECTIONS):
+        for k in range(REFINEMENTS):
             gradient = self._gradients(jacobian, left)
             gradient[~self._free] = 0
             solved = self.solve(gradient)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import FLAT, SUSPICIOUS
+from ..tolerances import PLACED, SUSPICIOUS
 from ..topology.polygons import Polygons
 from ..words import kind_text
 from .base import SHOWN, Look, Recovery, none_of, occurring, with_mid_nodes
@@ -252,7 +252,7 @@ class Surface(Recovery):
         """Whether the angles about every vertex inside add up to a full turn, up to rounding."""
         inside = np.isfinite(self.curvature)
         inside[self.boundary] = False
-        return bool(np.abs(self.curvature[inside]).max(initial=0.0) < FLAT)
+        return bool(np.abs(self.curvature[inside]).max(initial=0.0) < PLACED)
 
     @property
     def fits_no_plane(self) -> bool:

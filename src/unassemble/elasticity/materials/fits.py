@@ -20,7 +20,7 @@ from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
 _LARGEST = 50_000_000  # numbers in a least-squares problem
-_AS_WELL = 10.0  # by which factor fewer cells may explain the entries worse than all candidates
+_AS_WELL = 1 / LITTLE  # by which factor fewer cells may explain the entries worse than all candidates
 _EXPLAINED = 10 * LAST_DIGITS  # what least squares leave of entries that cells explain, relative to their row
 _FOUR_DIGITS = 1e4  # by which factor what a cell adds to an entry exceeds what is left of entries, at least
 

@@ -33,7 +33,6 @@ from .identities import Identities, identities
 PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
-_CORRECTIONS = 2
 
 Of = Callable[[NDArray[np.int64]], Identities]  # those of some rows
 
@@ -118,7 +117,7 @@ def _lowest(form: NDArray, count: int, gradient: Callable[[NDArray], NDArray]) -
     values, v = scipy.linalg.eigh(x.T @ form @ x)
     x = x @ v
     null = values < ALIKE**2
-    for _ in range(_CORRECTIONS):  # the error is then that of the gradient, not of the factor
+    for _ in range(2):  # the error is then that of the gradient, not of the factor
         x[:, null] -= scipy.linalg.cho_solve(factor, gradient(x[:, null]))
     # The stiff rest says nothing but where it begins.
     return np.asarray(x[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
