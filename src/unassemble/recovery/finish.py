@@ -13,8 +13,6 @@ from ..certificate import Findings, judge
 from ..clock import Clock
 from .base import Recovery
 
-_WORST = 10  # entries that fit worst, as many as a result lists
-
 
 class Comparison(Protocol):
     """A mesh compared with its matrix."""
@@ -91,7 +89,7 @@ def finish(
         comparison = compare(placed.mesh)
         examined = examine(placed.mesh, comparison)
         verdict = judge(examined.findings)
-    worst, misfits = comparison.worst(_WORST if verdict.status == "uncertified" else 0)
+    worst, misfits = comparison.worst(10 if verdict.status == "uncertified" else 0)
     return replace(
         placed.mesh,
         verdict=verdict,
