@@ -13,12 +13,13 @@ SIDE_BY_SIDE = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --di
 
 DOCS_INSTALLED := $(VENV)/.installed-docs
 
-.PHONY: help demo test test-all lint bench docs clean
+.PHONY: help demo test test-all test-arithmetic lint bench docs clean
 
 help:
 	@echo 'make demo   recover three matrices and draw the meshes (into demo-output/)'
 	@echo 'make test   run the tests, also with the fallback solver'
 	@echo 'make test-all  the same, and the long families'
+	@echo 'make test-arithmetic  the tests that decide close to the last digits, with other kernels, threads and solvers'
 	@echo 'make lint   check style, types, and which rooms use which'
 	@echo 'make bench  run the benchmarks'
 	@echo 'make docs   build the documentation (into docs/_build/html/)'
@@ -56,6 +57,11 @@ test: $(INSTALLED)
 
 test-all: test
 	$(SIDE_BY_SIDE) -m slow
+
+# What this processor cannot run, or computes as another does, is left out, and said.
+test-arithmetic: $(INSTALLED)
+	$(BIN)/python benchmarks/arithmetic.py -- -m 'arithmetic and not slow' \
+		--numprocesses auto --maxprocesses 8 --dist worksteal tests
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -43,9 +43,10 @@ def test_strips_that_bend_less_easily_are_certified_without_elements(kind):
     assert error(found.points, case.points) < 1e-12
 
 
+@pytest.mark.arithmetic
 def test_thin_bodies_lose_few_digits_where_charts_meet():
     case = stiffness("tet-p1", box("tet-p1", (201, 4, 4), stretch=(60, 1, 1)), lam=1.5)
     matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
     found = recover_elasticity(matrix, cells=False)
     assert found.certified
-    assert error(found.points, case.points[nodes]) < 1e-10
+    assert error(found.points, case.points[nodes]) < 1e-11

@@ -71,6 +71,7 @@ def test_springs_are_noticed_or_nothing_is_certified():
     assert certified
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("size", [1e-6, 1e-7, 1e-8, 1e-9])
 @pytest.mark.parametrize("make", [plate, shell, frame])
 def test_springs_hardly_above_rounding_do_not_pass_for_it(make, size):

@@ -18,7 +18,7 @@ from itertools import chain
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.special import fdtri
+from scipy.special import chdtri, fdtri
 
 from ..budget import REDRAWN
 from ..errors import GeometryError
@@ -180,7 +180,10 @@ def known_to(
             changes[seed] = (-left if mirrored else left) - misfits
     except GeometryError:
         return Known(float("inf"))
-    return Known(SIGMAS * float(np.sqrt(moved.max(initial=0.0) / REDRAWN)), _explained(misfits, changes))
+    # A weak equation moves nodes in one way only, so that few draws say little about its scale: its upper bound counts,
+    # and which numbers happen to be drawn does not decide.
+    variance = moved.max(initial=0.0) / chdtri(REDRAWN, 1 - CONFIDENCE)
+    return Known(SIGMAS * float(np.sqrt(variance)), _explained(misfits, changes))
 
 
 def _explained(misfits: NDArray[np.float64], changes: NDArray[np.float64]) -> bool:

@@ -29,7 +29,8 @@ class Mechanical(Recovery):
     """What bodies and structures share: positions that solve linear identities."""
 
     evidence: tuple[Evidence, ...] = ()  #: The null space of each piece's identities.
-    #: Of entries with few digits, how far off a node may be, ten standard deviations, over its piece's diameter.
+    #: Of entries with few digits, how far off a node may be, ten standard deviations (the largest that are
+    #: likely), over its piece's diameter.
     position_error: float | None = None
     #: (m, 4) cells of four corners, counter-clockwise in the plane.
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
