@@ -241,7 +241,7 @@ def hanging(rng: Generator) -> Truth:
     """Few elements, some of whose nodes lack rows and hang on a spring that joins them to another node."""
     body = plain_body(rng, few=rng.random() < 0.7)
     case, d, n = body.case, body.case.dim, len(body.case.points)
-    ends = rng.permutation(n)[: 2 * int(rng.integers(1, 3))].reshape(-1, 2)
+    ends = rng.permutation(n)[: 2 * min(int(rng.integers(1, 3)), n // 2)].reshape(-1, 2)
     total = np.zeros((n, d) * 2)
     for i, j in ends:
         axis = case.points[i] - case.points[j]

@@ -73,7 +73,7 @@ def fault_of(truth: Truth, found: Recovery) -> str:
         if not np.isfinite(x).all():
             return "a determined node without coordinates"
         if found.dim < y.shape[1]:
-            off = within_plane(x, y)
+            off = within_plane(x, y, gauge_of(truth, found))
         elif isinstance(found, Body) and truth.direction is not None:
             off = misplaced(x, y[:, axes_of(truth, found, np.isin(node, own))], gauge_of(truth, found))
         else:
@@ -109,7 +109,7 @@ def misplaced(x: NDArray, y: NDArray, gauge: str) -> float:
     return float(np.linalg.norm(x - y, axis=1).max() / extent)
 
 
-def within_plane(x: NDArray, y: NDArray) -> float:
+def within_plane(x: NDArray, y: NDArray, gauge: str) -> float:
     """The same in space, for answers in a plane (n, 2) where the matrix falls into one for bending and one for forces.
 
     That is so where all nodes are in a plane across an axis, whichever; else the error is infinite.
@@ -117,7 +117,7 @@ def within_plane(x: NDArray, y: NDArray) -> float:
     flat = np.flatnonzero(np.ptp(y, axis=0) <= 1e-9 * np.linalg.norm(np.ptp(y, axis=0)))
     pairs = [[a, b] for a, b in permutations(range(3), 2) if set(range(3)) - {a, b} <= set(flat.tolist())]
     turned = [y[:, pair] * signs for pair in pairs for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-    return min((misplaced(x, one, "translation") for one in turned), default=np.inf)
+    return min((misplaced(x, one, gauge) for one in turned), default=np.inf)
 
 
 def axes_of(truth: Truth, found: Recovery, rows: NDArray[np.bool_]) -> list[int]:

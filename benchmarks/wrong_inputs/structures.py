@@ -54,6 +54,19 @@ def lattice(rng: Generator, *, few: bool = False) -> Built:
     return assembled(model, points, ends)
 
 
+def round_lattice(rng: Generator) -> Built:
+    """Equal tubes along three axes, or in a plane: they bend alike both ways, so that whole lattices look alike."""
+    counts = [(2, 2, 2), (3, 2, 2), (3, 3, 2), (2, 2, 3), (4, 2, 2), (3, 3, 1), (5, 3, 1), (2, 3, 3)][rng.integers(8)]
+    points, ends = grid(counts)
+    points = points * (rng.choice([1.0, 2.0, 3.0]) if rng.random() < 0.7 else rng.choice([1.0, 2.0, 3.0], 3))
+    left = rng.random(len(ends)) >= (0.15 if rng.random() < 0.3 else 0.0)
+    model = model_on(points)
+    model.add_section("tube", 1e-2, 1e-4, 1e-4, 2.5e-4)
+    for k, (i, j) in enumerate(ends[left]):
+        model.add_member(str(k), str(i), str(j), "steel", "tube")
+    return assembled(model, points, ends[left])
+
+
 def tower(rng: Generator, *, few: bool = False) -> Built:
     """Regular polygons over one another that become smaller, with columns, and diagonals on some sides."""
     sides, storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3 if few else 5))
@@ -142,7 +155,7 @@ def prestressed(rng: Generator) -> Truth:
     """Members with an axial force of their own: geometric stiffness besides the elastic one."""
     given = with_members(rng)
     axial = np.full(len(given.members), 1.0)
-    sort = rng.integers(4)
+    sort = rng.integers(6)
     if sort == 1:
         axial = rng.standard_normal(len(axial))
     elif sort == 2:
@@ -157,6 +170,8 @@ def prestressed(rng: Generator) -> Truth:
 
 def with_members(rng: Generator) -> Built:
     """Half of them lattices of members, most of them regular: there forces alone may fit a wrong size."""
+    if rng.random() < 0.4:
+        return round_lattice(rng)
     if rng.random() < 0.25:
         counts = (int(rng.integers(2, 4)), int(rng.integers(1, 4)), int(rng.integers(2, 4)))
         return built.frame(counts, int(rng.integers(1 << 30)), float(rng.choice([0.0, 0.0, 0.1])))
