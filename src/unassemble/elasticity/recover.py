@@ -126,7 +126,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
             sure,
             advice=GIVE_NUMBERING,
         )
-    allowed = max(CERTIFIED, spread)
+    # How well positions are known was asked of entries with few digits: decimals are few for weak rows.
+    allowed = np.inf if request.rounding else CERTIFIED
 
     def place() -> Placed[Body]:
         moved = anchored(request, rows, placed, component, 1.0, free=free)
@@ -148,9 +149,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         return BodyComparison(_certificate(request, body, elements=found.certified), fit)
 
     def examine(_: Body, compared: BodyComparison) -> Examined:
-        # Where it compares nothing its error is NaN. How well positions are known was asked of entries with few digits:
-        # decimals are few for weak rows.
-        if not objections and request.rounding is None and compared.certificate.backward_error > allowed:
+        if not objections and compared.certificate.backward_error > allowed:  # NaN where it compares nothing
             objections.append(not_given_back(compared.certificate))
         return Examined(Findings((sure,), compared.backward_error, tuple(objections), another, allowed=allowed))
 
