@@ -52,7 +52,9 @@ def recover_vector(
         if other is None:
             raise
         return other
-    return body if body.status != "uncertified" else _by_rotations(numbering, request) or body
+    if body.status != "uncertified" or body.n_cells:  # what speaks against elements that were found is not to be evaded
+        return body
+    return _by_rotations(numbering, request) or body
 
 
 def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:
