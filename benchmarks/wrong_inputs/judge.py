@@ -74,7 +74,7 @@ def fault_of(truth: Truth, found: Recovery) -> str:
             return "a determined node without coordinates"
         if found.dim < y.shape[1]:
             off = within_plane(x, y, gauge_of(truth, found))
-        elif isinstance(found, Body) and truth.direction is not None:
+        elif found.operator in SIZELESS and truth.direction is not None:  # axes may have other names
             off = misplaced(x, y[:, axes_of(truth, found, np.isin(node, own))], gauge_of(truth, found))
         else:
             off = misplaced(x, y, gauge_of(truth, found))
