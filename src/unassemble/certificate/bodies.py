@@ -6,14 +6,15 @@ a node have to be there, and so every entry of its rows is that of the cells.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 
-from ..budget import AT_ONCE
-from ..tolerances import CANCELLED, CERTIFIED
+from ..budget import AT_ONCE, SAMPLE
+from ..tolerances import CANCELLED, CERTIFIED, ROUNDED
 from .comparison import relative
 from .solids import Rule, rules_of, stiffness
 
@@ -30,12 +31,30 @@ class BodyCertificate:
     misfits: NDArray[np.float64]  # (k,) of each, relative in this way
     compared: NDArray[np.bool_]  # (N,) rows all of whose entries were
     unexplained: NDArray[np.int64]  # (u,) of these, rows that are not given back
+    # what cells leave of the entries between nodes with positions, each over the sizes of its rows; None for identities
+    remainder: sp.csr_array | None = None
 
     def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The pairs that fit worst, worst first, and their misfits: those above the bound."""
         above = np.flatnonzero(self.misfits > CERTIFIED)
         order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
         return self.pairs[order], self.misfits[order]
+
+    @property
+    def silent(self) -> NDArray[np.int64]:
+        """Rows of which cells leave something that they do not have to explain, next to supports for one."""
+        if self.remainder is None:
+            return np.empty(0, np.int64)
+        return np.unique(self.remainder.tocoo().row)
+
+    def could_be_elements(self, allowed: float) -> bool:
+        """Whether what cells leave may be the stiffness of other elements, of which supports took nodes away.
+
+        The rows and columns that are left of an element's stiffness matrix are positive semidefinite, as is the matrix
+        of a spring, and so is any sum of them. One wrong entry leaves a matrix that is not. `allowed` is how far below
+        zero an eigenvalue may be, relative to the rows.
+        """
+        return self.remainder is None or _semidefinite(self.remainder, allowed)
 
 
 def certify_body(
@@ -69,8 +88,9 @@ def certify_body(
     for rule in rules_of(rich) if names else ():
         assembled = _assembled(row_of, points, blocks, lame, usual | {rich: rule}, len(node_of_row)).tocoo()
         found = _compared(given, assembled, compared, penalty, size)
+        rest = _remainder(given, assembled, size, known[node_of_row] & named)
         if best is None or not best.backward_error <= found.backward_error:
-            best = found
+            best = replace(found, remainder=rest)
         if best.backward_error <= CERTIFIED:
             break
     return best if best is not None else _nothing(len(node_of_row))
@@ -139,6 +159,40 @@ def _nothing(order: int) -> BodyCertificate:
     return BodyCertificate(
         float("nan"), np.empty((0, 2), np.int64), np.empty(0), np.zeros(order, dtype=bool), np.empty(0, np.int64)
     )
+
+
+def _remainder(
+    given: sp.coo_array, assembled: sp.coo_array, size: NDArray[np.float64], asked: NDArray[np.bool_]
+) -> sp.csr_array:
+    """What cells leave of the entries between rows that are `asked`, (N,), over the root of the sizes of both rows.
+
+    With the sign of the diagonal. What is rounding is left out. A penalty counts for the size of its row.
+    """
+    rest = (given.tocsr() - assembled.tocsr()).tocoo()
+    own = np.maximum(size, np.abs(rest.diagonal()))
+    own = np.where(asked & (own > 0), own, 1.0)
+    value = rest.data / np.sqrt(own[rest.row] * own[rest.col])
+    there = asked[rest.row] & asked[rest.col] & (np.abs(value) > ROUNDED)
+    sign = np.sign(given.diagonal().sum())
+    return sp.csr_array((sign * value[there], (rest.row[there], rest.col[there])), shape=rest.shape)
+
+
+def _semidefinite(matrix: sp.csr_array, allowed: float) -> bool:
+    """Whether no eigenvalue of a symmetric matrix is below minus what is allowed.
+
+    By Sylvester's law of inertia: the pivots of the matrix, with as much added to its diagonal, are positive.
+    """
+    rows = np.unique(matrix.tocoo().row)
+    if not len(rows):
+        return True
+    some = sp.csc_array(matrix[rows][:, rows] + allowed * sp.eye_array(len(rows)))
+    if len(rows) <= SAMPLE // 4:
+        return bool(np.linalg.eigvalsh(some.toarray())[0] > 0)
+    try:
+        factor = splu(some, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:  # a pivot is zero
+        return False
+    return bool((factor.U.diagonal() > 0).all() and np.array_equal(factor.perm_r, factor.perm_c))
 
 
 def _row_sizes(matrix: sp.csr_array, node_of_row: NDArray) -> NDArray[np.float64]:

@@ -15,8 +15,8 @@ from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
 from ..recovery import Body, Examined, Placed, finish
-from ..tolerances import ALIKE, CERTIFIED
-from ..words import GIVE_NUMBERING, Reason
+from ..tolerances import ALIKE, CERTIFIED, PLACED
+from ..words import GIVE_NUMBERING, Reason, count_of
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
@@ -24,6 +24,8 @@ from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
 from .verdict import (
+    BESIDE_CELLS,
+    NO_ELEMENTS,
     NOTHING_CHECKED,
     RESTS_ON_PLANES,
     WEAK_AND_UNKNOWN,
@@ -148,10 +150,18 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         fit = found.backward_error if found.certified else error
         return BodyComparison(_certificate(request, body, elements=found.certified), fit)
 
-    def examine(_: Body, compared: BodyComparison) -> Examined:
+    def examine(body: Body, compared: BodyComparison) -> Examined:
         if not objections and compared.certificate.backward_error > allowed:  # NaN where it compares nothing
             objections.append(not_given_back(compared.certificate))
-        return Examined(Findings((sure,), compared.backward_error, tuple(objections), another, allowed=allowed))
+        exact = request.rounding is None
+        if not objections and exact and not compared.certificate.could_be_elements(PLACED):
+            objections.append(NO_ELEMENTS)
+        fits, remarks = sure, []
+        if beside := len(compared.certificate.silent):
+            fits = f"{sure}, but for {beside:,} of its {len(rows.node_of_row):,} rows"
+            remarks = [f"{count_of(beside, 'row has', 'rows have')} {BESIDE_CELLS}"]
+        found_out = Findings((fits,), compared.backward_error, tuple(objections), another, allowed=allowed)
+        return Examined(found_out, remarks)
 
     return finish(request.clock, place, compare, examine)
 

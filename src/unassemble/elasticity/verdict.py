@@ -24,6 +24,15 @@ RESTS_ON_PLANES = Reason(
     advice=WITHOUT_SUPPORTS,
 )
 
+NO_ELEMENTS = Reason(
+    "what the elements leave of the entries between nodes with positions is not the stiffness of other elements, which "
+    "would be positive semidefinite: an entry is wrong, or an element is missing",
+    advice="check the entries next to rows that do not annihilate translations",
+)
+BESIDE_CELLS = (
+    "entries that the listed elements do not explain, as next to supports, where elements have lost a node: an element "
+    "all of whose nodes are in such rows, or coupled to them, may be missing"
+)
 WEAK_AND_UNKNOWN = Reason(
     "neighbouring nodes differ in stiffness by more than six digits, and no elements re-assemble that explain it"
 )
