@@ -100,3 +100,26 @@ def test_rows_next_to_a_clamp_are_not_compared():
     assert 0 < certificate.compared.sum() < len(certificate.compared)
     beside = np.abs(case.matrix[~gone][:, gone]).sum(axis=1) > 0
     assert not certificate.compared[beside].any()
+
+
+def test_what_supports_leave_of_elements_is_a_stiffness_and_what_a_wrong_entry_leaves_is_none():
+    """Elements that lost a node leave a positive semidefinite matrix; a changed entry next to them does not."""
+    case = body("tri-p1", lam=1.5)
+    gone = np.repeat(on_plane(case, 0), 2)
+    matrix = sp.csr_array(case.matrix[~gone][:, ~gone])
+    beside = np.flatnonzero(np.abs(case.matrix[~gone][:, gone]).sum(axis=1) > 0)
+    found = recover(matrix)
+    assert found.certified
+    certificate = on_the_result(found, matrix)
+    assert len(certificate.silent)
+    assert set(certificate.silent) <= set(beside)
+    assert certificate.could_be_elements(1e-8)
+    assert any("may be missing" in warning for warning in found.warnings)
+    entry = matrix.tocoo()
+    near = np.isin(entry.row, beside) & np.isin(entry.col, beside) & (np.abs(entry.data) > 0.1)
+    near &= found.node_of_row[entry.row] < found.node_of_row[entry.col]
+    i, j = int(entry.row[near][0]), int(entry.col[near][0])
+    changed = matrix.tolil()
+    changed[i, j] = changed[j, i] = 20 * matrix[i, j]
+    assert not on_the_result(found, sp.csr_array(changed)).could_be_elements(1e-8)
+    assert not recover(sp.csr_array(changed)).certified

@@ -51,8 +51,8 @@ class BodyCertificate:
         """Whether what cells leave may be the stiffness of other elements, of which supports took nodes away.
 
         The rows and columns that are left of an element's stiffness matrix are positive semidefinite, as is the matrix
-        of a spring, and so is any sum of them. One wrong entry leaves a matrix that is not. `allowed` is how far below
-        zero an eigenvalue may be, relative to the rows.
+        of a spring, and so is any sum of them. What a wrong entry leaves mostly is not. `allowed` is how far below zero
+        an eigenvalue may be, relative to the rows.
         """
         return self.remainder is None or _semidefinite(self.remainder, allowed)
 
