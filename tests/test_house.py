@@ -92,6 +92,15 @@ def test_files_are_read_in_one_go():
     assert {name: n for name, n in lines.items() if n > MOST_LINES} == {}
 
 
+def test_no_two_classes_have_one_name():
+    homes: dict[str, list[str]] = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    assert {name: files for name, files in homes.items() if len(files) > 1} == {}
+
+
 def test_tests_go_through_doors():
     """Top-level modules and packages: what a room is made of may change without a test that breaks."""
     for path in sorted(Path(__file__).parent.rglob("*.py")):

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
-from .nodes import Numbering
+from .nodes import NodeNumbering
 from .nodes.orders import ORDERS
 from .nodes.rounded import Rounding, with_exact_sums
 from .nodes.unknowns import (
@@ -35,7 +35,7 @@ class VectorReading:
     """A matrix read as vector-valued."""
 
     # of solids, or of frames, shells and plates, whose nodes have rotations too
-    numbering: Numbering | StructuralNumbering
+    numbering: NodeNumbering | StructuralNumbering
     why: str  # what speaks for it; empty where the caller asked for it
     rounding: Rounding | None = None  # of entries with few digits
 
@@ -116,10 +116,12 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     return _by_nodes(matrix, find_numbering, "it is no planar mesh")
 
 
-def _by_nodes(matrix: OperatorMatrix, find: Callable[[sp.csr_array], Numbering], because: str) -> VectorReading | None:
+def _by_nodes(
+    matrix: OperatorMatrix, find: Callable[[sp.csr_array], NodeNumbering], because: str
+) -> VectorReading | None:
     """A structure; or nodes whose rows annihilate constants, as those of scalar matrices never do; or a truss."""
     whole, rounding = _exact(matrix)
-    found: Numbering | StructuralNumbering | None = find_structure(whole)
+    found: NodeNumbering | StructuralNumbering | None = find_structure(whole)
     if found is None:
         with suppress(RecoveryError):
             found = find(whole)

@@ -20,7 +20,7 @@ from .boundaries import (
 from .budget import Budget
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
-from .conforming.roles import Cells
+from .conforming.roles import OrderedCells
 from .errors import GeometryError, RecoveryError
 from .masses import less_mass, recover_elements_with_terms, recover_with_terms
 from .matrix import OperatorMatrix
@@ -58,7 +58,7 @@ class ScalarReadings:
     def other_elements(self) -> PlanarMesh | None:
         """A mesh of other elements than linear triangles; None where no cells show, or none is near."""
 
-        def of_cells(matrix: OperatorMatrix, cells: Iterable[Cells]) -> PlanarMesh:
+        def of_cells(matrix: OperatorMatrix, cells: Iterable[OrderedCells]) -> PlanarMesh:
             return recover_conforming(matrix, cells, self.placement, self.clock, self.options)
 
         def plainly() -> PlanarMesh | None:

@@ -9,7 +9,7 @@ from .clock import Clock
 from .elasticity.recover import serve_body
 from .errors import RecoveryError
 from .matrix import OperatorMatrix
-from .nodes import Numbering, Request
+from .nodes import NodeNumbering, Request
 from .nodes.nodal import nodal_matrix
 from .operators import VectorReading
 from .recovery import Recovery
@@ -57,7 +57,7 @@ def recover_vector(
     return _by_rotations(numbering, request) or body
 
 
-def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:
+def _by_rotations(numbering: NodeNumbering, request: Request) -> Recovery | None:
     """Nodes in space by rigid rotations alone, of any material and element; None where these certify nothing."""
     if numbering.block_size != PINNED.dim:
         return None

@@ -5,7 +5,7 @@ import pytest
 import skfem
 from skfem.models.poisson import laplace
 
-from unassemble.conforming import Cells, Entries, parts_of
+from unassemble.conforming import AssembledEntries, OrderedCells, parts_of
 from unassemble.elements import KINDS, exact_rule, planar_rules
 
 ELEMENTS = {
@@ -49,7 +49,7 @@ def cells_of(name, basis):
     """In meshio's order: scikit-fem numbers the nodes of the last side of a cubic triangle from the other end."""
     cells = basis.element_dofs.T.astype(np.int64)
     cells = cells[:, [0, 1, 2, 3, 4, 5, 6, 8, 7, 9]] if name == "triangle10" else cells
-    return Cells({KINDS[name]: cells}, told=True, order=np.arange(basis.N))
+    return OrderedCells({KINDS[name]: cells}, told=True, order=np.arange(basis.N))
 
 
 @pytest.mark.parametrize("name", ELEMENTS)
@@ -100,7 +100,7 @@ def test_derivative_of_entries(name, straight):
     basis = skfem.Basis(mesh_of(name), ELEMENTS[name]())
     (part,) = parts_of(cells_of(name, basis))
     rule = exact_rule(kind) if kind.simplex else next(iter(planar_rules(kind).values()))
-    entries = Entries(part, {kind: rule}, straight=straight)
+    entries = AssembledEntries(part, {kind: rule}, straight=straight)
     z = (basis.doflocs[0] + 1j * basis.doflocs[1])[part.piece.vertices][: entries.n]
     z = z if entries.areas(z).min() > 0 else np.conj(z)
     rng = np.random.default_rng(0)

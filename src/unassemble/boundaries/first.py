@@ -14,7 +14,7 @@ from ..linalg import solved
 from ..planar.conformal import conformal_map, estimate_scale
 from ..planar.cotangent import areas
 from ..topology import Piece
-from .fit import Fit, FitOptions, WholeEntries
+from .fit import FitOptions, WholeEntries, WholeEntriesFit
 from .patch import distance, fit_near
 from .rim import Rim
 
@@ -23,7 +23,7 @@ SLOWLY: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)  # weigh
 FADING: Sequence[float] = (0.1, 0.01, 1e-3, 0.0)
 
 
-def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[Fit]:
+def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[WholeEntriesFit]:
     """Fits, one after the other, steps `newton` being those of all vertices of a large mesh.
 
     Few entries at the rim may have several solutions, and which of them a fit comes to is decided by what is guessed
@@ -73,12 +73,12 @@ def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], 
     return np.where(whole | piece.inner, given, np.maximum(given, third))
 
 
-def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) -> Fit | None:
+def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) -> WholeEntriesFit | None:
     """A fit from near, in a large mesh: steps of the rim by itself and of all vertices in turn."""
     band = distance(problem.piece, rim.opened, 5) <= 5
     if 2 * band.sum() >= len(band) or not upright(problem.piece, z):
         return None
-    fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
+    fit = WholeEntriesFit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
     first, second, third = ((mu, 3) for mu in FADING[:-1])
     large = problem.piece.n_vertices >= LARGE
     for turn in ([first, second], [third]) if large else ([first], [second], [third]):
@@ -87,7 +87,7 @@ def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) ->
     return fit
 
 
-def _start(problem: WholeEntries, rim: Rim, weight: float, near: NDArray | None) -> Fit | None:
+def _start(problem: WholeEntries, rim: Rim, weight: float, near: NDArray | None) -> WholeEntriesFit | None:
     """The best first fit from drawings without crossings.
 
     The conformal map of guessed entries is the nearest one, if its ring is not inside out; where it turns triangles

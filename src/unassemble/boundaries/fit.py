@@ -49,7 +49,7 @@ class FitOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class WholeEntriesFit:
     """Where the iteration has ended."""
 
     z: NDArray[np.complex128]
@@ -122,7 +122,7 @@ class WholeEntries:
 
     def fit(
         self, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
-    ) -> Fit:
+    ) -> WholeEntriesFit:
         """Improve positions in which no triangle is turned over; sides of other entries have a prior of weight mu."""
         options = options or FitOptions()
         prior = ShapePrior.of(self.piece, ~whole)
@@ -162,9 +162,9 @@ class WholeEntries:
         beyond = np.maximum(np.abs(misfit) - reach, 0)[whole]
         rest, size = float(np.linalg.norm(beyond)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e", mu, rest, size)
-        return Fit(z, scale, rest, size)
+        return WholeEntriesFit(z, scale, rest, size)
 
-    def moved(self, fit: Fit, whole: NDArray[np.bool_], step: NDArray[np.complex128]) -> Fit:
+    def moved(self, fit: WholeEntriesFit, whole: NDArray[np.bool_], step: NDArray[np.complex128]) -> WholeEntriesFit:
         """Positions displaced by a step (n,), with the factors that are best then, if whole entries fit no worse."""
 
         def misfit(z: NDArray, scale: NDArray) -> NDArray:
@@ -176,7 +176,7 @@ class WholeEntries:
         better = np.linalg.norm(misfit(z, scale)) < np.linalg.norm(misfit(fit.z, fit.scale))
         return replace(fit, z=z, scale=scale) if better else fit
 
-    def faded(self, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+    def faded(self, z: NDArray, scale: NDArray, whole: NDArray[np.bool_], mus: Sequence[float]) -> WholeEntriesFit:
         """One fit after the other, with less and less prior."""
         for mu in mus:
             found = self.fit(z, scale, whole, mu)

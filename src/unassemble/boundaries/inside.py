@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
 from .first import FADING, LARGE, first_fits, nearest_conformal
-from .fit import EXACT, Fit, FitOptions, WholeEntries
+from .fit import EXACT, FitOptions, WholeEntries, WholeEntriesFit
 from .grow import grow
 from .judge import determined, unknowns
 from .lengths import fit_lengths
@@ -70,7 +70,7 @@ def fit_inside(given: PieceEntries, scale: float | None = None) -> InsideMesh | 
     return None if core is None else finished(problem, *core, unit)
 
 
-def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh | None:
+def finished(problem: WholeEntries, fit: WholeEntriesFit, rim: Rim, unit: float) -> InsideMesh | None:
     """A fit with what fits of the vertices taken off, and its verdict; c was in this unit. None where it is no fit."""
     if not fit.misfit <= EXACT:
         return None
@@ -90,7 +90,7 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
     return InsideMesh(fit.z, fit.scale * unit, problem.region, rim.given, entries, known)
 
 
-def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
+def _core(problem: WholeEntries, rim: Rim) -> tuple[WholeEntriesFit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
     for again, fit in enumerate(first_fits(problem, rim, _NEWTON)):
@@ -102,7 +102,7 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     return flat if flat is not None and flat[0].misfit <= EXACT else found
 
 
-def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim] | None:
+def _bare(problem: WholeEntries, rim: Rim, fit: WholeEntriesFit, peaks: float) -> tuple[WholeEntriesFit, Rim] | None:
     """A fit without the vertices of the rim, which bend nothing then; None where few entries are left, or it fails."""
     bare: Rim | None = rim.bared()
     start = fit.z
@@ -116,7 +116,7 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
     return None
 
 
-def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit, Rim]:
+def shrunk(problem: WholeEntries, rim: Rim, fit: WholeEntriesFit, peaks: float) -> tuple[WholeEntriesFit, Rim]:
     """Fits with fewer vertices at the rim each, until one has all whole entries, or has them without the rim."""
     for _ in range(_ROUNDS):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
@@ -131,13 +131,15 @@ def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit
     return fit, rim
 
 
-def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Rim | None:
+def _less(problem: WholeEntries, rim: Rim, fit: WholeEntriesFit, peaks: float) -> Rim | None:
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
     return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)))
 
 
-def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) -> tuple[Fit, Rim]:
+def _grown(
+    problem: WholeEntries, core: WholeEntriesFit, rim: Rim, held: NDArray[np.bool_]
+) -> tuple[WholeEntriesFit, Rim]:
     """A core that fits, and what fits of the other vertices: by themselves first, then with those that are held.
 
     Best held, (n,) bool, are those that the core determines: what fits elsewhere in it is one of many.
@@ -171,7 +173,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
     return (fit, grown) if fit.misfit <= EXACT else (core, rim)
 
 
-def _grown_by_sets(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
+def _grown_by_sets(problem: WholeEntries, core: WholeEntriesFit, rim: Rim) -> tuple[WholeEntriesFit, Rim]:
     """What grows by small sets from vertices that a core determines, and fits as a whole; else the core."""
     piece, held = problem.piece, determined(problem, core.z, core.scale, rim.whole)[0]
     every = replace(rim, left=np.ones_like(rim.left))

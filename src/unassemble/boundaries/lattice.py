@@ -20,7 +20,7 @@ from .grid import Grid
 
 
 @dataclass(frozen=True, eq=False)
-class _Kind:
+class _CellKind:
     """Cells of a grid."""
 
     corners: NDArray[np.int64]  # (shapes, k, 2) counter-clockwise
@@ -32,14 +32,14 @@ _SQUARE = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
 _SIDES = ((0, 1, 0), (1, 2, 1), (2, 3, 0), (3, 0, 1))
 _KINDS = {
     # Rectangles: linear elements on either half, whose entry on the diagonal vanishes.
-    4: _Kind(_SQUARE, np.array(_SIDES), -np.eye(2, 3) / 2),
-    6: _Kind(
+    4: _CellKind(_SQUARE, np.array(_SIDES), -np.eye(2, 3) / 2),
+    6: _CellKind(
         np.array([[(0, 0), (1, 0), (0, 1)], [(1, 1), (0, 1), (1, 0)]]),
         np.array([(0, 1, 0), (0, 2, 1), (1, 2, 2)]),
         np.array([(-1, 0, -1), (0, -1, -1), (0, 0, 1)]) / 2,
     ),
     # Bilinear elements.
-    8: _Kind(
+    8: _CellKind(
         _SQUARE,
         np.array([*_SIDES, (0, 2, 2), (1, 3, 3)]),
         np.array([(-2, 1, 0), (1, -2, 0), (-1, -1, -3), (-1, -1, 3)]) / 6,
@@ -107,7 +107,7 @@ class Lattice:
         return cls(grid.neighbours == 8, scale, z[used], cells, beyond.tocsr(), added)
 
 
-def _around(at: NDArray[np.int64], kind: _Kind) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _around(at: NDArray[np.int64], kind: _CellKind) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Coordinates from 0 of rows, then of all vertices beside them; and all cells with a row among their corners."""
     width = int(np.ptp(at[:, 1])) + 3
     own = (at - at.min(axis=0) + 1) @ [width, 1]

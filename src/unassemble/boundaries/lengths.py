@@ -27,7 +27,7 @@ from ..planar.polish import polish
 from ..tolerances import LAST_DIGITS, ROUNDED, SUMMED
 from ..topology.pieces import planar_pieces
 from .first import SLOWLY
-from .fit import Fit, FitOptions, WholeEntries
+from .fit import FitOptions, WholeEntries, WholeEntriesFit
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -59,7 +59,7 @@ class _Metric:
 @np.errstate(all="ignore")  # a step of a problem without answer may be of any size, and ends as no metric
 def fit_lengths(
     problem: WholeEntries, rim: Rim, z: NDArray[np.complex128], newton: FitOptions
-) -> tuple[Fit, Rim] | None:
+) -> tuple[WholeEntriesFit, Rim] | None:
     """A fit of whole entries by way of lengths, and its rim; None where no flat metric is found.
 
     Positions z (n,) are those to start from. Where the rim comes to no flat metric, it is peeled next to peaks of the

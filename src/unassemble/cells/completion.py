@@ -10,7 +10,7 @@ from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..tolerances import LITTLE
-from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
+from ..topology import LocalNumbering, Piece, Polygons, Topology, components, located, require_planar
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, unexplained
 from .judge.labelling import Labelling, add_differing_factors
@@ -21,7 +21,7 @@ from .undivided import undivided
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Component:
     """What components of the graph were found to be; rows of edges are left as they are."""
 
     pieces: Solved
@@ -47,7 +47,7 @@ def completed(
     Raises RecoveryError if no component has cells.
     """
     kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept)]
+    parts = [_Component(kept)]
     failures: list[RecoveryError] = []
     label, found = np.full(matrix.n, -1), components(matrix.n, matrix.edges)
     for k, part in enumerate(found):
@@ -78,7 +78,7 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
     doubtful = unexplained(matrix, topology)
     unsolved = GeometryError("not solved")
     kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept)]
+    parts = [_Component(kept)]
     for part in components(matrix.n, matrix.edges):
         if doubtful[part.vertices[0]]:
             labelling = first_labelling(len(part.vertices), part.edges, -matrix.entries[part.edge_rows])
@@ -89,19 +89,19 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
 
 def _labelled(
     matrix: OperatorMatrix,
-    numbering: Numbering,
+    numbering: LocalNumbering,
     own: list[Piece],
     attempt: Attempt,
     scale: float | None,
     budget: Budget,
-) -> _Part:
+) -> _Component:
     """One component: the labelling that fits, or the triangles that there were, or the best labelling."""
     weights = -matrix.entries[numbering.edge_rows]
     errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors, budget)
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
-    before = _Part([(piece, attempt(piece)) for piece in own])
+    before = _Component([(piece, attempt(piece)) for piece in own])
     misfit = misfits(matrix.n, matrix.edges, -matrix.entries, before.pieces)
     if placed := [(piece, mesh) for piece, mesh in before.pieces if isinstance(mesh, PieceMesh)]:
         add_differing_factors(placed, misfit, scale)
@@ -119,7 +119,7 @@ def _labelled(
     )
 
 
-def _part(matrix: OperatorMatrix, numbering: Numbering, labelling: Labelling) -> _Part:
+def _part(matrix: OperatorMatrix, numbering: LocalNumbering, labelling: Labelling) -> _Component:
     """A labelling in the numbering of the matrix."""
     vertices = numbering.vertices
     pieces: Solved = [
@@ -128,11 +128,11 @@ def _part(matrix: OperatorMatrix, numbering: Numbering, labelling: Labelling) ->
     ]
     pairs = np.sort(vertices[labelling.edges], axis=1)
     added = ~contains(pair_keys(matrix.n, *matrix.edges.T), pair_keys(matrix.n, *pairs.T))
-    return _Part(pieces, pairs[added], undivided([piece for piece, _ in pieces], added)[1])
+    return _Component(pieces, pairs[added], undivided([piece for piece, _ in pieces], added)[1])
 
 
 def _merged(
-    matrix: OperatorMatrix, topology: Topology, parts: list[_Part], failures: tuple[str, ...]
+    matrix: OperatorMatrix, topology: Topology, parts: list[_Component], failures: tuple[str, ...]
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """All parts on one list of edges."""
     n = matrix.n

@@ -4,6 +4,6 @@ The form M = L/2 - T annihilates the coordinates whatever the element is (theory
 from the sets of rows that are coupled to each other.
 """
 
-from .assembly import Entries as Entries
+from .assembly import AssembledEntries as AssembledEntries
 from .parts import parts_of as parts_of
-from .roles import Cells as Cells
+from .roles import OrderedCells as OrderedCells

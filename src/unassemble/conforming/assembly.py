@@ -29,7 +29,7 @@ from .parts import Part
 _CELLS = AT_ONCE // 1024  # few enough for the cache: a cell has about a hundred numbers at a time
 
 
-class Entries:
+class AssembledEntries:
     """Weights w = -K of all pairs of a part, for positions of its nodes, or of its corners where it is straight.
 
     A :class:`~unassemble.planar.polish.Model`.

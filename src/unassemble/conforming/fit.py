@@ -23,7 +23,7 @@ from ..planar.polish import count_flipped
 from ..scalar.solving import Task
 from ..tolerances import ALIKE, CERTIFIED, ROUNDED
 from ..topology.keys import distinct
-from .assembly import Entries
+from .assembly import AssembledEntries
 from .parts import Part
 from .sets import pairs_of
 
@@ -37,7 +37,7 @@ class Fitted(PieceMesh):
 
     part: Part
     weights: NDArray[np.float64]  # (e,) -A_ij of the part's edges
-    entries: Entries  # what its entries are for given parameters
+    entries: AssembledEntries  # what its entries are for given parameters
     rule: dict[str, str]  # quadrature of each kind of cell
     straight: bool
 
@@ -127,7 +127,9 @@ def by_rule(part: Part, weights: NDArray, z: NDArray, c: float) -> Iterator[Fitt
 
 
 def _with_rule(part: Part, weights: NDArray, z: NDArray, c: float, rule: dict[str, str], *, straight: bool) -> Fitted:
-    entries = Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
+    entries = AssembledEntries(
+        part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight
+    )
     return Fitted(z, c, part=part, weights=weights, entries=entries, rule=rule, straight=straight)
 
 

@@ -12,7 +12,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Piece
 from ..topology.keys import distinct, found, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
-from .roles import Cells
+from .roles import OrderedCells
 from .sets import pairs_of
 
 Blocks = dict[Kind, NDArray[np.int64]]
@@ -69,7 +69,7 @@ class Part:
         return sp.csr_array((np.concatenate(values), place), shape=(self.n, self.n_corners))
 
 
-def parts_of(shown: Cells) -> list[Part]:
+def parts_of(shown: OrderedCells) -> list[Part]:
     """The parts of cells in any orientation, in order of their lowest row.
 
     Nodes are numbered in the order that the cells come with.

@@ -26,12 +26,12 @@ from ..topology.keys import distinct, pair_keys
 from ..words import Reason
 from .fit import Fitted, fitted
 from .parts import Part, parts_of, reversal
-from .roles import Cells, ordered_cells
+from .roles import OrderedCells, ordered_cells
 from .sets import node_sets
 
 
 def recover_conforming(
-    stored: OperatorMatrix, shown: Iterable[Cells], placement: Placement, clock: Clock, options: ScalarOptions
+    stored: OperatorMatrix, shown: Iterable[OrderedCells], placement: Placement, clock: Clock, options: ScalarOptions
 ) -> PlanarMesh:
     """The mesh of a checked scalar matrix, certified or the nearest.
 
@@ -85,7 +85,7 @@ def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:
 
 def shown_cells(
     stored: OperatorMatrix, *, mass: bool = False, lost: NDArray[np.bool_] | None = None
-) -> Iterator[Cells]:
+) -> Iterator[OrderedCells]:
     """Cells that the rows may form, the likeliest first; with a mass term, or others `lost` at some rows, (n,) bool."""
     numbering = local_numbering(stored.n, stored.edges)
     order = numbering.vertices
@@ -99,10 +99,10 @@ def shown_cells(
     for sets in node_sets(near, None if lost is None else lost[order]):
         with suppress(TopologyError):
             blocks, told = ordered_cells(near, sets, mass=mass, lost=lost is not None)
-            yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
+            yield OrderedCells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
-def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> PlanarMesh:
+def _recovered(stored: OperatorMatrix, cells: OrderedCells, clock: Clock, task: Task) -> PlanarMesh:
     with clock("cells"):
         parts = parts_of(cells)
         matrix, topology = _with_zeros(stored, parts)

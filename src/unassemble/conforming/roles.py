@@ -27,7 +27,7 @@ _MOST = 6  # rows of a cell whose sides only entries tell
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class OrderedCells:
     """Cells in meshio's order, in either orientation."""
 
     blocks: dict[Kind, NDArray[np.int64]]

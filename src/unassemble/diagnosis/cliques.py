@@ -34,7 +34,7 @@ CELLS = {
 
 
 @dataclass(frozen=True)
-class Cells:
+class CliqueShares:
     """What pairs of coupled rows have in common."""
 
     nodes: int  # of a cell, where pairs show such; else 0
@@ -49,7 +49,7 @@ class Cells:
     twins: float  # share of rows with the neighbours of another row, and coupled to it: several unknowns of one node
 
 
-def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
+def cells_of(n: int, edges: NDArray[np.int64]) -> CliqueShares:
     """Look at some pairs i < j of a graph, of which there is at least one, all near to each other."""
     most = 1500  # pairs to look at, in a part of four times as many rows
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
@@ -79,7 +79,7 @@ def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
     _, which, alone = np.unique(key, return_inverse=True, return_counts=True)
     shares = found.max() / len(pairs), (within > 0).mean(), (count > 0).mean(), (within / np.maximum(count, 1)).mean()
     often, fours, threes, around = map(float, shares)
-    return Cells(size if told else 0, shared, often, fours, threes, around, float((alone[which] > 1).mean()))
+    return CliqueShares(size if told else 0, shared, often, fours, threes, around, float((alone[which] > 1).mean()))
 
 
 def often(share: float) -> bool:

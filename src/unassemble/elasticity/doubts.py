@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..nodes.nodal import NodalMatrix, determined, valid_pairs
-from ..nodes.numbering import Numbering
+from ..nodes.numbering import NodeNumbering
 from ..tolerances import ALIKE
 from ..words import count_of
-from .materials.cells import Cells
+from .materials.cells import RecognisedCells
 from .nullspace.checked import checked, checked_beside
 from .nullspace.placing import Solution
 
 
 def unconfirmed(
-    nodal: NodalMatrix, numbering: Numbering, points: NDArray[np.float64], shown: NDArray[np.bool_] | None
+    nodal: NodalMatrix, numbering: NodeNumbering, points: NDArray[np.float64], shown: NDArray[np.bool_] | None
 ) -> NDArray[np.bool_]:
     """(n,) nodes with coordinates whose rows may be those of several, and that cells do not confirm.
 
@@ -31,7 +31,7 @@ def unconfirmed(
     return (determined(points) if numbering.likely else nodal.doubtful) & ~confirmed
 
 
-def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
+def unborne(nodal: NodalMatrix, solution: Solution, found: RecognisedCells) -> NDArray[np.bool_]:
     """(n,) nodes whose coordinates hang on an assumption that neither other equations nor cells confirm."""
     if solution.hanging is None:
         return np.zeros(nodal.n, dtype=bool)
@@ -42,7 +42,7 @@ def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.
     return np.asarray(solution.hanging & ~_held_together(found.among(shown), solution.component, firm))
 
 
-def unchecked(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
+def unchecked(nodal: NodalMatrix, solution: Solution, found: RecognisedCells) -> NDArray[np.bool_]:
     """(n,) nodes with coordinates that are in no cell which re-assembles, and that no other identities check.
 
     So are nodes in the place of another, unless their own rows are whole: springs draw nodes together, and bodies in
@@ -67,7 +67,7 @@ def _coinciding(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(away[:, 1] <= ALIKE)
 
 
-def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _held_together(found: RecognisedCells, piece: NDArray[np.int64], firm: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(n,) nodes of the most cells of each piece that lie to each other as they do without an assumption.
 
     Cells re-assemble wherever they lie, and those of the plane in any size. Two nodes that they share fix both; and
@@ -86,7 +86,7 @@ def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool
     return np.asarray(member[np.isin(label, best)].sum(axis=0) > 0)
 
 
-def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def guessed_directions(numbering: NodeNumbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
 
     Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
@@ -104,7 +104,7 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
 def notes(
     nodal: NodalMatrix,
     solution: Solution,
-    found: Cells | None,
+    found: RecognisedCells | None,
     loose: NDArray[np.bool_],
     masks: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
     guessed: int,

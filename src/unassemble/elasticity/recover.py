@@ -12,13 +12,13 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
-from ..nodes.numbering import Numbering
+from ..nodes.numbering import NodeNumbering
 from ..nodes.rounded import known_to
 from ..recovery import Body, Examined, Placed, finish
 from ..tolerances import ALIKE, CERTIFIED, PLACED
 from ..words import GIVE_NUMBERING, Reason, count_of
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
-from .materials.cells import Cells, recognise_cells
+from .materials.cells import RecognisedCells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
@@ -37,7 +37,7 @@ from .verdict import (
 )
 
 
-def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
+def serve_body(nodal: NodalMatrix, numbering: NodeNumbering, request: Request) -> Body:
     """Recover a solid body; InputError for anchors that do not fit, RecoveryError if no piece is determined."""
     if uncoupled(nodal):
         raise GeometryError(
@@ -58,7 +58,7 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
     return _described(nodal, numbering, solution, request)
 
 
-def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, request: Request) -> Body:
+def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution, request: Request) -> Body:
     """The body, with its certificate, material and cells, and the sentences that go with them."""
     cells, rounding = request.cells, request.rounding
 
@@ -74,7 +74,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         spread = rounding.spread if rounding else 0.0
         near = not error >= max(ALIKE, spread)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
-    found = Cells()
+    found = RecognisedCells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio, max(CERTIFIED, spread))
@@ -215,7 +215,7 @@ def _flat(points: NDArray[np.float64]) -> bool:
     return bool(values[-1] <= ALIKE * values[0])
 
 
-def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:
+def _in_units(found: RecognisedCells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:
     """Lame coefficients of the cells, and the mean shear modulus of each piece, for the size that it was given.
 
     Entries go like the modulus times length to the power d - 2.

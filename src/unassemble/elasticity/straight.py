@@ -36,7 +36,7 @@ from ..nodes.shape import Shape, set_aside
 from ..recovery import Evidence
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR
 from .materials.cells import coupled
-from .materials.entries import Entries, Model, Pairs
+from .materials.entries import BlockEntries, MaterialModel, Pairs
 from .nullspace.atlas import null_fields
 
 
@@ -94,7 +94,7 @@ def _frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np
 
     M is found up to size and a point reflection. The picture y, (n, d), is that of one piece; NaN elsewhere.
     """
-    graph, entries = coupled(nodal, picture), Entries.of(nodal, determined(picture))
+    graph, entries = coupled(nodal, picture), BlockEntries.of(nodal, determined(picture))
     for blocks in candidates(graph, picture) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
         if told is None or not len(told.key) or len(blocks) > 1:
@@ -106,7 +106,7 @@ def _frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np
     return None
 
 
-def _tables(block: Block, picture: NDArray, entries: Entries) -> Iterator[tuple[NDArray, NDArray]]:
+def _tables(block: Block, picture: NDArray, entries: BlockEntries) -> Iterator[tuple[NDArray, NDArray]]:
     """Tables G and entries of pairs of nodes, (e, d, d) each and relative to their row, for one rule after the other.
 
     Of the rows of some nodes that lost no neighbour, without the pairs of cells of which not all can be there.
@@ -123,7 +123,7 @@ def _tables(block: Block, picture: NDArray, entries: Entries) -> Iterator[tuple[
     sure[pairs.place[doubtful][pairs.there[doubtful]]] = False
     weight = 1 / some.size[sure, None, None]
     for rule in rules(block.kind):  # lambda = 1, mu = 0
-        model = Model(picture, block.cells, block.kind, rule)
+        model = MaterialModel(picture, block.cells, block.kind, rule)
         tables = model.assembled(pairs, some, np.ones((len(block.cells), 1)) * [1.0, 0.0])
         yield tables[sure] * weight, some.value[sure] * weight
 

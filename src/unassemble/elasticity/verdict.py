@@ -7,12 +7,12 @@ import scipy.sparse as sp
 
 from ..certificate import BodyCertificate
 from ..nodes.nodal import NodalMatrix, without_trace
-from ..nodes.numbering import Numbering
+from ..nodes.numbering import NodeNumbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
 from ..tolerances import CERTIFIED, SMALL
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
-from .materials.cells import Cells
+from .materials.cells import RecognisedCells
 from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
@@ -61,8 +61,8 @@ def examined(
     nodal: NodalMatrix,
     solution: Solution,
     error: float,
-    found: Cells,
-    numbering: Numbering,
+    found: RecognisedCells,
+    numbering: NodeNumbering,
     rounding: Rounding | None,
     known: Known | None,
 ) -> tuple[str, list[Reason]]:
@@ -114,7 +114,7 @@ def _soft(solution: Solution) -> Reason:
     return Reason(free + "that it moves may be wrong", "slender bodies have such fields, and nodes that few rows hold")
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool) -> Iterator[Reason]:
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: NodeNumbering, *, exact: bool) -> Iterator[Reason]:
     """Why positions may be wrong whatever elements say; entries that are rounded have no `exact` null vector."""
     if any(solution.freedoms):
         unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
@@ -133,7 +133,7 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
         yield Reason(torn, "rows between them lack entries, or belong to other axes or nodes", advice=GIVE_NUMBERING)
 
 
-def _to_identities(nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering) -> Iterator[Reason]:
+def _to_identities(nodal: NodalMatrix, solution: Solution, error: float, numbering: NodeNumbering) -> Iterator[Reason]:
     """Why identities alone, without elements that re-assemble, certify nothing."""
     if solution.straight:
         yield Reason("elements told the axes of a homogeneous body, but re-assembled the matrix is not the given one")

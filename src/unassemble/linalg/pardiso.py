@@ -22,7 +22,7 @@ from ..errors import SolverError
 from .upper import UpperTriangle
 
 
-class _Kind(IntEnum):
+class _MatrixType(IntEnum):
     REAL_DEFINITE = 2
     REAL_INDEFINITE = -2
     COMPLEX_HERMITIAN_INDEFINITE = -4
@@ -97,9 +97,9 @@ class PardisoFactorisation:
             self._iparm[36] = matrix.block  # rows of square blocks
         complex_entries = np.iscomplexobj(matrix.data)
         if complex_entries:
-            self._mtype = _Kind.COMPLEX_HERMITIAN_INDEFINITE
+            self._mtype = _MatrixType.COMPLEX_HERMITIAN_INDEFINITE
         else:
-            self._mtype = _Kind.REAL_DEFINITE if definite else _Kind.REAL_INDEFINITE
+            self._mtype = _MatrixType.REAL_DEFINITE if definite else _MatrixType.REAL_INDEFINITE
         self._dtype = np.dtype(np.complex128 if complex_entries else np.float64)
         self._matrix = matrix
         self._call(_Phase.ANALYSE)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..certificate import Certificate, Findings, Terms, Unique, certify_masses
 from ..clock import Clock
 from ..conforming.recover import shown_cells
-from ..conforming.roles import Cells
+from ..conforming.roles import OrderedCells
 from ..errors import GeometryError, RecoveryError
 from ..linalg import UpperTriangle, nearly_singular
 from ..linalg.definite import STEPS
@@ -74,7 +74,7 @@ def recover_with_terms(
 
 
 def recover_elements_with_terms(
-    matrix: OperatorMatrix, of_cells: Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh], clock: Clock
+    matrix: OperatorMatrix, of_cells: Callable[[OperatorMatrix, Iterable[OrderedCells]], PlanarMesh], clock: Clock
 ) -> PlanarMesh | None:
     """The mesh of c L + s M or S c L S, of other elements; None where row sums show neither, or nothing comes near.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..certificate import Terms
 from ..conforming.recover import shown_cells
-from ..conforming.roles import Cells
+from ..conforming.roles import OrderedCells
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
@@ -23,7 +23,7 @@ from .cells import Blocks, Weights, less, told_by_entries, weights_at
 from .held import RowSums
 
 
-def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, Cells, Weights] | None:
+def less_mass(matrix: OperatorMatrix) -> tuple[OperatorMatrix, OrderedCells, Weights] | None:
     """Of c L + s M first c L, its cells and their weights; None where no sums, or no cells, tell the mass."""
     sign = RowSums(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None

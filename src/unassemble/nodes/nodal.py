@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..tolerances import CANCELLED, PENALTY
-from .numbering import Numbering
+from .numbering import NodeNumbering
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class NodalMatrix:
         return np.add.reduceat(self.data, self.indptr[:-1], axis=0)  # no node is empty
 
 
-def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
+def nodal_matrix(matrix: sp.csr_array, numbering: NodeNumbering) -> NodalMatrix:
     """Gather the unknowns of each node into blocks; those of rows of the identity are left out, as if eliminated."""
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row

@@ -28,7 +28,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Numbering(Rows):
+class NodeNumbering(Rows):
     """Those of a solid, and what speaks for them."""
 
     block_size: int
@@ -75,11 +75,11 @@ class Numbering(Rows):
         return self.share > HARDLY_ANY and self.quality > MOST * self.share
 
 
-def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> Numbering:
+def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> NodeNumbering:
     """A numbering and what speaks for it; of one that was `searched` for more is asked."""
     node, direction = reading.node, reading.direction
     share = annihilated_share(matrix, direction, d, searched=searched)
     common = coupled_in_common(matrix, node)
     odd = int(unaccounted(matrix, node, direction, d).any(axis=1).sum()) if searched else 0
     identity = row_sizes(matrix) == 0
-    return Numbering(node, direction, kind, share, d, identity, common, odd, reading.open_row, reading.unnamed)
+    return NodeNumbering(node, direction, kind, share, d, identity, common, odd, reading.open_row, reading.unnamed)

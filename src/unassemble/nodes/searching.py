@@ -18,17 +18,17 @@ from .constants import adding_up, proven_directions, row_sizes, unaccounted, wit
 from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
 from .grouping import by_first_row, pattern_of, same_pattern, without_doubles
-from .numbering import Numbering, measured
+from .numbering import NodeNumbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 
 
-def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
+def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[NodeNumbering]:
     """Numberings with so many unknowns per node that were found, up to the first that leaves no doubt.
 
     `as_stored` believes only what entries as they are stored show, in one of the usual orders.
     """
     live, inner = live_part(matrix)
-    found: list[Numbering] = []
+    found: list[NodeNumbering] = []
     row = np.arange(matrix.shape[0])
     for kind, d, reading in _readings(inner, sizes, as_stored):
         node, direction = row + len(live), np.zeros(len(row), np.int64)  # a row of the identity is a node by itself

@@ -17,7 +17,7 @@ from ..errors import InputError, RecoveryError
 from ..tolerances import MOST, NEARLY_ALL
 from .constants import row_sizes
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
-from .numbering import Numbering, measured
+from .numbering import NodeNumbering, measured
 from .orders import ORDERS, Reading, regular
 from .searching import searched
 
@@ -26,7 +26,7 @@ MORE_THAN_STIFFNESS = (
 )
 
 
-def find_numbering(matrix: sp.csr_array, block_size: int | None = None, *, at_sight: bool = False) -> Numbering:
+def find_numbering(matrix: sp.csr_array, block_size: int | None = None, *, at_sight: bool = False) -> NodeNumbering:
     """Recognise nodes and directions of a symmetric matrix (N, N), with 2 or 3 unknowns per node if that is known.
 
     Nodes are looked for `at_sight` only where a glance shows that there are some: unknowns in order, or rows of the
@@ -62,7 +62,7 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
     return (int(group.max()) + 1, d) if of_size[d] > NEARLY_ALL * order else None
 
 
-def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
+def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> NodeNumbering:
     """The numbering of unknowns in an order that the caller knows, "interleaved" or "by component".
 
     InputError if the order of the matrix is no multiple of the block size; RecoveryError if the rows of this numbering
@@ -85,13 +85,13 @@ def _sizes(block_size: int | None) -> tuple[int, ...]:
     return (block_size,) if block_size else (3, 2)
 
 
-def _best(readings: Iterable[Numbering | None]) -> Numbering | None:
+def _best(readings: Iterable[NodeNumbering | None]) -> NodeNumbering | None:
     """The one that most speaks for; None if nothing does for any."""
     some = [one for one in readings if one is not None and one.quality > 0]
     return max(some, key=lambda one: one.quality, default=None)
 
 
-def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> NodeNumbering | None:
     """The best of the numberings that need no search, or what patterns show in its place.
 
     A clear one whose nodes each couple to common nodes is the only such one, unless nearly all couple to all: rows of
@@ -107,7 +107,7 @@ def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
     return best if best is None or not best.clear or best.common == 1 else _with_gaps(matrix, best, sizes)
 
 
-def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...]) -> Numbering:
+def _with_gaps(matrix: sp.csr_array, regular: NodeNumbering, sizes: tuple[int, ...]) -> NodeNumbering:
     """The numbering with gaps that patterns show in place of one without, where that one cannot be right.
 
     Boundary nodes often come first, and rollers leave one unknown to each of many: taken in pairs, they fit in among
@@ -123,7 +123,7 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     return replace(regular, odd=impossible)
 
 
-def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:
+def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> NodeNumbering | None:
     """One of the two numberings that need no search, if order and pattern allow it."""
     if matrix.shape[0] % d:
         return None
@@ -131,7 +131,7 @@ def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -
     return None if checked and one.common < MOST else one
 
 
-def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
+def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> NodeNumbering:
     """A numbering that the caller knows: node and direction of each row, (N,).
 
     InputError if two rows have the same node and direction, or the arrays do not fit the matrix.

@@ -16,7 +16,7 @@ from .equations import AngleSystem
 from .harmonic import HarmonicReduction, tube_triangles
 from .layout import least_squares_layout
 from .newton import NewtonOptions, solve
-from .parts import Part, part
+from .parts import MeshPart, part
 from .starts import angles_of
 
 
@@ -114,7 +114,7 @@ def boundary_fixed_point(
     return FixedPointResult(z, np.array(trace), np.array(moves), np.array(residuals), converged, status, products)
 
 
-def ring(piece: Piece) -> Part:
+def ring(piece: Piece) -> MeshPart:
     """The tube of a piece without holes, which has to be a ring around other elements."""
     if piece.n_loops != 1:
         raise TopologyError(
@@ -129,7 +129,7 @@ def ring(piece: Piece) -> Part:
 
 
 def _tube_system(
-    piece: Piece, tube: Part, corners: Corners, weights: NDArray, z: NDArray, options: FixedPointOptions
+    piece: Piece, tube: MeshPart, corners: Corners, weights: NDArray, z: NDArray, options: FixedPointOptions
 ) -> AngleSystem:
     """Steps 2 and 3: the tube's own matrix, with cotangents from inside taken off its inner edges."""
     cotangents = 1 / np.tan(np.clip(angles_of(z, piece.triangles).ravel(), 1e-9, np.pi - 1e-9))
@@ -143,7 +143,7 @@ def _tube_system(
     return AngleSystem(corners, own, outer=outer)
 
 
-def _embed(tube: Part, angles: NDArray, options: FixedPointOptions) -> NDArray:
+def _embed(tube: MeshPart, angles: NDArray, options: FixedPointOptions) -> NDArray:
     if options.embedding == "layout":
         return least_squares_layout(tube.piece, angles)
     return bfs_embedding(tube.piece, angles, averaging=True)

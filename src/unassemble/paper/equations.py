@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .corners import Corners, following_corner
-from .jacobian import Jacobian
+from .jacobian import AngleJacobian
 
 Unknowns = Literal["cotangents", "angles"]
 
@@ -118,11 +118,11 @@ class AngleSystem:
             blocks.append(self.sum_of_sine_terms(np.log(np.sin(angles))))
         return np.concatenate(blocks)
 
-    def jacobian(self, x: NDArray) -> Jacobian:
+    def jacobian(self, x: NDArray) -> AngleJacobian:
         """J(x), matrix-free."""
         angles = self.angles(x)
         derivative = -(np.sin(angles) ** 2) if self.unknowns == "cotangents" else -1 / np.sin(angles) ** 2
-        return Jacobian(self, derivative, 1 / np.tan(angles) if self.sines else None)
+        return AngleJacobian(self, derivative, 1 / np.tan(angles) if self.sines else None)
 
     def advance(self, x: NDArray, step: NDArray, *, reach: float = 0.9) -> tuple[NDArray, float]:
         """x + t s with the greatest t <= 1 that keeps (8): no angle goes more than `reach` of its way to 0 or pi.

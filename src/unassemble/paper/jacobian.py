@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Jacobian:
+class AngleJacobian:
     """J at one point, as two products.
 
     Attributes

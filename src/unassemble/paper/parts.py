@@ -13,7 +13,7 @@ from .corners import following_corner
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class MeshPart:
     """Some triangles of a piece as a mesh of its own.
 
     Attributes
@@ -31,7 +31,7 @@ class Part:
     corners: NDArray[np.int64]
 
 
-def part(whole: Piece, mask: NDArray) -> Part:
+def part(whole: Piece, mask: NDArray) -> MeshPart:
     """The triangles in `mask` (m,), oriented as in the whole. They need not hang together."""
     of = np.flatnonzero(mask)
     vertices, local = np.unique(whole.triangles[of], return_inverse=True)
@@ -53,4 +53,4 @@ def part(whole: Piece, mask: NDArray) -> Part:
         boundary=boundary,
         loop_offsets=offsets,
     )
-    return Part(piece, of, (3 * of[:, None] + np.arange(3)).ravel())
+    return MeshPart(piece, of, (3 * of[:, None] + np.arange(3)).ravel())

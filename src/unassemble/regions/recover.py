@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..boundaries import recover_partial
 from ..boundaries.first import conformal, guessed, tutte, upright
-from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
+from ..boundaries.fit import EXACT, FitOptions, WholeEntries, WholeEntriesFit
 from ..boundaries.inside import InsideMesh, PieceEntries, finished, fit_inside, shrunk
 from ..boundaries.partial import distinct
 from ..boundaries.rim import Rim
@@ -92,7 +92,7 @@ def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray, budg
     return finished(problem, replace(fit, scale=scale), rim, unit)
 
 
-def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) -> Fit:
+def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) -> WholeEntriesFit:
     """A fit of the entries that a rim has whole, triangles exchanged where they do not fit; the problem has its region.
 
     With several triangles wrong, one that is put right may well leave more of a misfit than before: the least misfit of
@@ -100,7 +100,7 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) 
     """
     piece, weights, whole = problem.piece, problem.weights, rim.whole
 
-    def anew(region: NDArray, scale: NDArray) -> Fit:
+    def anew(region: NDArray, scale: NDArray) -> WholeEntriesFit:
         problem.region = region
         z = conformal(piece, guessed(piece, weights / problem.unit(scale), rim.given, 1.0), None)
         if not upright(piece, z):
@@ -114,7 +114,7 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) 
     region = problem.region
     best = anew(region, scale)
     seen, failed, last = {region.tobytes()}, 0, best.misfit
-    reached: list[tuple[float, int, NDArray[np.int64], Fit, Iterator[NDArray[np.int64]]]] = [
+    reached: list[tuple[float, int, NDArray[np.int64], WholeEntriesFit, Iterator[NDArray[np.int64]]]] = [
         (best.misfit, 0, region, best, exchanges(problem, best.z, best.scale, whole))
     ]
     while best.misfit > EXACT and reached and failed < 24:

@@ -13,7 +13,7 @@ from .solving import Solved
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class MisfitEvidence:
     """What can be said about a misfit beyond its size."""
 
     # standard deviation of independent errors of one size in the entries that would leave this misfit; None where there
@@ -30,7 +30,7 @@ _SPARE = 10  # entries beyond the unknowns, of fewer chance may give one much of
 _OF_ALL, _OF_MEAN = 0.15, 25.0  # squared misfit of an entry that stands out: of the sum, and in units of the mean
 
 
-def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> Evidence:
+def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> MisfitEvidence:
     """Evidence on a finished mesh; wrong entries are looked for if `search`.
 
     Unless their noise is known, errors of the size that rounding has where there are slivers do not stand out.
@@ -42,7 +42,7 @@ def weigh(solved: Solved, certificate: Certificate, *, search: bool) -> Evidence
     term = None
     if noise and solved.linear and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
         term = _term(solved, noise)
-    return Evidence(None if term else noise, suspects, term)
+    return MisfitEvidence(None if term else noise, suspects, term)
 
 
 def _term(solved: Solved, noise: float) -> Term | None:

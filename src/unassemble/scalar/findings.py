@@ -12,7 +12,7 @@ from ..cells import Alternative
 from ..certificate import Certificate, Findings, Unique
 from ..recovery import PlanarMesh
 from ..tolerances import CERTIFIED
-from .evidence import Evidence
+from .evidence import MisfitEvidence
 from .held import PlanarComparison
 from .reasons import ambiguous, objections
 from .solving import Solved
@@ -24,7 +24,7 @@ class Twice:
 
     near: PlanarComparison
     written: PlanarComparison
-    evidence: Evidence
+    evidence: MisfitEvidence
 
     @property
     def backward_error(self) -> float:
@@ -51,7 +51,7 @@ class Finished:
         return self.compared.near
 
     @property
-    def evidence(self) -> Evidence:
+    def evidence(self) -> MisfitEvidence:
         """What the misfit looks like."""
         return self.compared.evidence
 

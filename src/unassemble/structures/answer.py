@@ -12,10 +12,10 @@ from ..certificate import Findings, StructureCheck
 from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.numbering import Rows
 from ..nodes.rounded import Known, Rounding, known_to
-from ..recovery import Examined, Placed as Finished, Structure, finish
+from ..recovery import Examined, Placed, Structure, finish
 from ..tolerances import CERTIFIED, ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, words_of
-from .placed import Placed
+from .placed import PlacedNodes
 
 _LOADED = (
     "sums of moments are not whole, or contradict those of forces, and forces alone do not tell the size of this "
@@ -35,14 +35,14 @@ class HeldStructure:
     rounding: Rounding | None
     said: tuple[str, str]  # what holds, and what of it does not, by an {error}
 
-    def known(self, found: Placed, *, sized: bool) -> Known:
+    def known(self, found: PlacedNodes, *, sized: bool) -> Known:
         """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
         if self.rounding is None:
             loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
             return Known(float(self.error * np.sqrt(loosest.rows) / loosest.gap))
         return known_to(found.points, found.component, self.misfits, self.rounding, self.again, sized=sized)
 
-    def objections(self, found: Placed, known: Known, check: StructureCheck) -> Iterator[Reason]:
+    def objections(self, found: PlacedNodes, known: Known, check: StructureCheck) -> Iterator[Reason]:
         """What speaks against the positions."""
         error = max(self.error, check.backward_error)
         yield from known.objections(error, self.rounding, self.said[1].format(error=error) + _most_in(check))
@@ -80,7 +80,7 @@ def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
 def answer(
     request: Request,
     rows: Rows,
-    found: Placed,
+    found: PlacedNodes,
     held: HeldStructure,
     *,
     edges: NDArray[np.int64],
@@ -103,7 +103,7 @@ def answer(
         objections.append(Reason("most nodes that are coupled are in one place", advice=GIVE_NUMBERING))
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
-    def place() -> Finished[Structure]:
+    def place() -> Placed[Structure]:
         moved = anchored(request, rows, found.points, found.component, edge, sized=sized, free=free)
         objections.extend(moved.objections(held.said[0]))
         structure = Structure(
@@ -112,7 +112,7 @@ def answer(
             **mechanical_fields(request, rows, moved.points, found.component, found.evidence),
             **fields,
         )
-        return Finished(structure, (*request.matrix.warnings, *found.notes, *notes, *moved.notes))
+        return Placed(structure, (*request.matrix.warnings, *found.notes, *notes, *moved.notes))
 
     def examine(_: Structure, check: StructureCheck) -> Examined:
         against = [*held.objections(found, known, check), *objections]

@@ -19,7 +19,7 @@ from .certificate import forces, in_one_place, members_misfits, mispaired
 from .contradicted import said_of
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
-from .placed import Placed
+from .placed import PlacedNodes
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
 from .turning import turning_positions
@@ -117,7 +117,7 @@ def _placed(
     numbering: StructuralNumbering,
     rounding: Rounding | None,
     ends: NDArray[np.int64] | None = None,
-) -> tuple[Nodes, Straight, Placed, NDArray[np.bool_]]:
+) -> tuple[Nodes, Straight, PlacedNodes, NDArray[np.bool_]]:
     """Nodes, straight members, positions, and on which rows and rotations these rest; members between given ends."""
     spread = rounding.spread if rounding else 0.0
     nodes = nodes_of(matrix, numbering.layout, numbering.node_of_row, numbering.direction_of_row)

@@ -12,12 +12,12 @@ from ..recovery import Evidence
 from ..tolerances import CANCELLED, LAST_DIGITS, SINGULAR, SMALL
 from .equations import Equations
 from .layouts import Layout
-from .placed import Piece
+from .placed import EquationPiece
 
 _PROBES = 3
 
 
-def up_to_size(piece: Piece, d: int) -> tuple[NDArray[np.float64], Evidence, NDArray[np.float64]]:
+def up_to_size(piece: EquationPiece, d: int) -> tuple[NDArray[np.float64], Evidence, NDArray[np.float64]]:
     """Points of a piece whose equations leave the size free, evidence, and residuals (m, k) of random right-hand sides.
 
     GeometryError if more is free than translations and size.

@@ -25,7 +25,7 @@ from ..tolerances import SINGULAR, SMALL
 from .equations import Equations, joined
 from .layouts import Layout
 from .least_squares import least_squares
-from .placed import Placed, pieces
+from .placed import PlacedNodes, pieces
 
 
 def without_loads(given: Equations, layout: Layout) -> Equations:
@@ -66,7 +66,9 @@ def _added(one: Equations, other: Equations) -> Equations:
     )
 
 
-def told_under_loads(given: Equations, layout: Layout, found: Placed, edges: NDArray[np.int64]) -> NDArray[np.bool_]:
+def told_under_loads(
+    given: Equations, layout: Layout, found: PlacedNodes, edges: NDArray[np.int64]
+) -> NDArray[np.bool_]:
     """(n,) nodes whose positions, as found, these equations determine even if every node bears a load."""
     d, told = layout.dim, np.zeros(len(found.points), dtype=bool)
     left = without_loads(given, layout)

@@ -14,7 +14,7 @@ from ..recovery import Evidence
 from ..tolerances import CERTIFIED
 
 
-class Piece(NamedTuple):
+class EquationPiece(NamedTuple):
     """Equations that share no node with others."""
 
     nodes: NDArray[np.int64]  # (k,), increasing
@@ -25,7 +25,7 @@ class Piece(NamedTuple):
 
 def pieces(
     operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
-) -> Iterator[Piece]:
+) -> Iterator[EquationPiece]:
     """Connected pieces, in the order of their first nodes, of equations (m, n d); nodes in no equation are in none.
 
     Coupled nodes, `edges` (e, 2), of different pieces are left out. Used are all equations or those of `rows`, (k,).
@@ -42,16 +42,16 @@ def pieces(
         unknowns = (body[:, None] * d + np.arange(d)).ravel()
         links = np.searchsorted(body, edges[(of_node[edges] == k).all(axis=1)])
         if len(body):
-            yield Piece(body, rows[own], sp.csr_array(operator[own][:, unknowns]), links)
+            yield EquationPiece(body, rows[own], sp.csr_array(operator[own][:, unknowns]), links)
 
 
 # Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
 # being noticed; see :mod:`.turning`.
-Solve = Callable[[Piece], tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]]
+Solve = Callable[[EquationPiece], tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedNodes:
     """Positions of the nodes of all pieces."""
 
     points: NDArray[np.float64]  # (n, d), NaN where not determined
@@ -76,7 +76,7 @@ class Placed:
         return max(one.null_dimension for one in self.evidence)
 
 
-def without_free(found: Placed, most: int) -> Placed:
+def without_free(found: PlacedNodes, most: int) -> PlacedNodes:
     """The same; GeometryError where the null space of a piece has a larger dimension: positions mean nothing."""
     if found.null_dimension > most:
         raise GeometryError(
@@ -89,14 +89,14 @@ def without_free(found: Placed, most: int) -> Placed:
 
 def placed(
     operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Solve, allowed: float = CERTIFIED
-) -> Placed:
+) -> PlacedNodes:
     """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
     Equations (m, n d) that would be disturbed without being noticed are left out, and what only they determine with
     them; they contradict each other if residuals exceed what is `allowed`. GeometryError if no node is determined.
     """
 
-    def from_those(used: NDArray[np.bool_]) -> Placed:
+    def from_those(used: NDArray[np.bool_]) -> PlacedNodes:
         n = operator.shape[1] // d
         points, component = np.full((n, d), np.nan), np.full(n, -1)
         unnoticed, notes = np.zeros(len(used), dtype=bool), []
@@ -113,7 +113,7 @@ def placed(
             evidence.append(one)
         if not evidence:
             raise failure or GeometryError("no node has an equation that supports leave whole")
-        return Placed(points, component, tuple(evidence), used, unnoticed, tuple(notes))
+        return PlacedNodes(points, component, tuple(evidence), used, unnoticed, tuple(notes))
 
     best = every = from_those(np.ones(operator.shape[0], dtype=bool))
     while best.residual <= allowed and best.unnoticed.any():

@@ -19,13 +19,13 @@ from ..errors import GeometryError
 from ..nodes.anchoring import Request
 from ..nodes.constants import row_sizes
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
-from ..nodes.numbering import Numbering
+from ..nodes.numbering import NodeNumbering
 from ..nodes.orders import ORDERS, regular
 from ..recovery import Evidence, Structure
 from ..tolerances import CANCELLED, CERTIFIED, SMALL
 from .answer import HeldStructure, about_loose, answer
 from .least_squares import up_to_size
-from .placed import Piece, Placed, placed, without_free
+from .placed import EquationPiece, PlacedNodes, placed, without_free
 
 
 class Bars(NamedTuple):
@@ -80,7 +80,7 @@ def _balanced(nodal: NodalMatrix, whole: NDArray, allowed: float) -> NDArray[np.
 
 def truss_numbering(
     matrix: sp.csr_array, block_size: int | None = None, kind: str | None = None, allowed: float = CANCELLED
-) -> Numbering | None:
+) -> NodeNumbering | None:
     """The usual numbering in which all blocks are those of bars, however many supports there are; None if none is.
 
     Of `block_size` 2 or 3 and a `kind` of order if these are known; what is `allowed` see :func:`bars_of`.
@@ -89,13 +89,13 @@ def truss_numbering(
     sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
     for d, name in product(sizes, ORDERS if kind is None else (kind,)):
         node, direction = regular(order, d, name)
-        numbering = Numbering(node, direction, name, 0.0, d, row_sizes(matrix) == 0, 1.0)
+        numbering = NodeNumbering(node, direction, name, 0.0, d, row_sizes(matrix) == 0, 1.0)
         if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
             return numbering
     return None
 
 
-def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
+def serve_truss(nodal: NodalMatrix, numbering: NodeNumbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
     allowed = rounding.spread if rounding else CERTIFIED
@@ -130,7 +130,7 @@ def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: R
     )
 
 
-def _place_joints(bars: Bars, n: int, allowed: float) -> Placed:
+def _place_joints(bars: Bars, n: int, allowed: float) -> PlacedNodes:
     """Find positions for which all bars have their directions.
 
     A block of which only one row or column is left is that of a bar for any numbers, and whole blocks are those of
@@ -144,7 +144,7 @@ def _place_joints(bars: Bars, n: int, allowed: float) -> Placed:
     blocks = np.stack([across, -across], axis=1).reshape(2 * m, d, d)
     operator = sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
 
-    def solve(piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
+    def solve(piece: EquationPiece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
         points, evidence, probes = up_to_size(piece, d)
         which = piece.rows[::d] // d
         seen = across[which] @ probes.reshape(len(which), d, -1)

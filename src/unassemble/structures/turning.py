@@ -17,11 +17,13 @@ from .layouts import Layout
 from .least_squares import least_squares, unnoticed_in, up_to_size
 from .loads import told_under_loads
 from .nodes import Nodes
-from .placed import Piece, Placed, placed, without_free
+from .placed import EquationPiece, PlacedNodes, placed, without_free
 from .straight import Straight
 
 
-def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIED) -> tuple[Placed, NDArray[np.bool_]]:
+def turning_positions(
+    nodes: Nodes, members: Straight, allowed: float = CERTIFIED
+) -> tuple[PlacedNodes, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
     Where these contradict each other as well, from all but the rows of few nodes, if the others agree without them.
@@ -29,7 +31,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     `allowed`. With (n, b, rotations) rows and rotations that positions rest on, whose forces have to vanish.
     GeometryError if no node is determined, or more is free than translations.
     """
-    attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
+    attempts: list[tuple[PlacedNodes, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.pattern(len(layout.displacements)), 1).nonzero())
@@ -69,7 +71,9 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     return without_free(found, most), counted
 
 
-def _under_loads(found: Placed, given: Equations, layout: Layout, edges: NDArray[np.int64], allowed: float) -> Placed:
+def _under_loads(
+    found: PlacedNodes, given: Equations, layout: Layout, edges: NDArray[np.int64], allowed: float
+) -> PlacedNodes:
     """The same, in doubt where only forces tell positions, and loads could change those of most nodes unnoticed.
 
     Without rotations no size is told at all. Where moments are used, they contradict loads.
@@ -88,13 +92,15 @@ def _under_loads(found: Placed, given: Equations, layout: Layout, edges: NDArray
     return found
 
 
-def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
+def _doubts(found: PlacedNodes, allowed: float) -> tuple[bool, bool, bool, int, float]:
     """What speaks against positions, the gravest first."""
     free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
     return found.residual > allowed, free, bool(found.unnoticed.any()) or found.loaded, lost, found.residual
 
 
-def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
+def _solved(
+    given: Equations, layout: Layout, piece: EquationPiece
+) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
     """Coordinates of one piece, evidence, and what would go unnoticed; GeometryError if they are hardly determined."""
     d, b, n, m = layout.dim, layout.block_size, len(piece.nodes), len(piece.rows)
     part = given[piece.rows]

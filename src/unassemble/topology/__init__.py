@@ -7,7 +7,7 @@ from .cycles import (
     three_cycles as three_cycles,
 )
 from .keys import with_sides as with_sides
-from .numbering import Numbering as Numbering, components as components, local_numbering as local_numbering
+from .numbering import LocalNumbering as LocalNumbering, components as components, local_numbering as local_numbering
 from .orientation import loops as loops
 from .pieces import planar_pieces as planar_pieces
 from .polygons import Polygons as Polygons

@@ -11,7 +11,7 @@ from .keys import Grouped, first_rows, runs
 
 
 @dataclass(frozen=True, eq=False)
-class Numbering:
+class LocalNumbering:
     """A graph whose vertices have numbers of its own."""
 
     vertices: NDArray[np.int64]  # (k,) vertex of the original graph behind each number
@@ -19,11 +19,11 @@ class Numbering:
     edges: NDArray[np.int64]  # (e, 2) new numbers i < j in lexicographic order
 
 
-def local_numbering(n: int, edges: NDArray) -> Numbering:
+def local_numbering(n: int, edges: NDArray) -> LocalNumbering:
     """Number vertices in breadth-first order.
 
     The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for memory:
-    after this, what lies near each other on the mesh does so in memory. `edges` (e, 2): as in a :class:`Numbering`.
+    after this, what lies near each other on the mesh does so in memory. `edges` (e, 2) as in `LocalNumbering`.
     """
     upper = sp.coo_array((np.ones(len(edges), np.int8), edges.astype(np.int32).T), shape=(n, n)).tocsr()
     vertices, _ = breadth_first(upper + upper.T)
@@ -34,10 +34,12 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
     # Compression to columns sorts by the lower end, then the higher one, and takes the row numbers along.
     by_low = sp.coo_array((np.arange(len(edges), dtype=np.int32), (high, low)), shape=(n, n)).tocsc()
     low = np.repeat(np.arange(n), np.diff(by_low.indptr))
-    return Numbering(vertices.astype(np.int64), by_low.data.astype(np.int64), np.column_stack([low, by_low.indices]))
+    return LocalNumbering(
+        vertices.astype(np.int64), by_low.data.astype(np.int64), np.column_stack([low, by_low.indices])
+    )
 
 
-def components(n: int, edges: NDArray) -> list[Numbering]:
+def components(n: int, edges: NDArray) -> list[LocalNumbering]:
     """Connected components with edges, (e, 2), each in a numbering of its own, largest first."""
     count, label = connected(n, *edges.T)
     used = np.zeros(n, dtype=bool)
@@ -48,7 +50,7 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
     order = np.argsort(-size, kind="stable")[: np.count_nonzero(size)]
     v, e = vertices.start.tolist(), rows.start.tolist()
     return [
-        Numbering(vertices.order[v[k] : v[k + 1]], rows.order[e[k] : e[k + 1]], local[e[k] : e[k + 1]])
+        LocalNumbering(vertices.order[v[k] : v[k + 1]], rows.order[e[k] : e[k + 1]], local[e[k] : e[k + 1]])
         for k in order.tolist()
     ]
 

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from ..errors import NotPlanarError, RecoveryError
 from .cycles import not_faces, three_cycles
-from .numbering import Numbering, components
+from .numbering import LocalNumbering, components
 from .pieces import planar_pieces
 from .planarity import rotation_system, too_many
 from .surface import Piece, Topology
 
 
-def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topology:
+def surfaces(n: int, edges: NDArray, numbering: LocalNumbering | None = None) -> Topology:
     """The surfaces that 3-cycles make; no planarity test, and edges or whole components may be left over.
 
     3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
@@ -23,14 +23,14 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
     `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order; `numbering`: of the same graph: in
     which to work, and which pieces keep where they are the whole graph.
     """
-    pieces = _surfaces_of(numbering or Numbering(np.arange(n), np.arange(len(edges)), edges))
+    pieces = _surfaces_of(numbering or LocalNumbering(np.arange(n), np.arange(len(edges)), edges))
     if pieces is None:
         pieces = [piece for part in components(n, edges) for piece in _surfaces_of(part) or ()]
     pieces.sort(key=lambda piece: int(piece.vertices.min()))
     return Topology(n, edges, tuple(pieces), "3-cycles")
 
 
-def _surfaces_of(part: Numbering) -> list[Piece] | None:
+def _surfaces_of(part: LocalNumbering) -> list[Piece] | None:
     """None where 3-cycles make no surface, or some are no sphere with holes; edges may be left over."""
     n, edges = len(part.vertices), part.edges
     if too_many(n, edges):
@@ -45,7 +45,7 @@ def _surfaces_of(part: Numbering) -> list[Piece] | None:
     ] or None
 
 
-def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryError:
+def located(error: RecoveryError, part: LocalNumbering, *, named: bool) -> RecoveryError:
     """The same error in the numbering of the whole, on demand with the place of its part of the graph."""
     where = f"in the component of row {part.vertices.min()} ({len(part.vertices)} rows): " if named else ""
     return _not_planar(error.why, where) if isinstance(error, NotPlanarError) else type(error)(where + str(error))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...errors import RecoveryError
 from ...matrix import OperatorMatrix
 from ...tolerances import ALIKE
-from ...topology import Numbering, Polygons, components
+from ...topology import LocalNumbering, Polygons, components
 from ...topology.drawn import from_rotation
 from ...topology.embedding import face_complexes
 from ...topology.faces import FaceComplex
@@ -73,7 +73,7 @@ def alternatives(
 
 
 def _other(
-    stored: OperatorMatrix, part: Numbering, cells: Polygons, z: NDArray, scale: float | None, agree: float
+    stored: OperatorMatrix, part: LocalNumbering, cells: Polygons, z: NDArray, scale: float | None, agree: float
 ) -> Alternative | None:
     embedding = _embedding(part, z)
     if embedding is None or not cells.count:
@@ -105,7 +105,7 @@ def _relabelled(around: Around, answer: Labelling) -> Iterator[Move]:
         yield from Updates(Sheet(around.candidates, answer.scale)).as_good(answer, supposed, usual, reduced)
 
 
-def _embedding(part: Numbering, z: NDArray[np.complex128]) -> FaceComplex | None:
+def _embedding(part: LocalNumbering, z: NDArray[np.complex128]) -> FaceComplex | None:
     """The graph as the mesh lies; where that is no embedding, as parts may lie on others, any."""
     n, edges = len(part.vertices), part.edges
     tail, head = np.concatenate([edges, edges[:, ::-1]]).T

@@ -18,12 +18,12 @@ from ...elements.cliques import Graph
 from ...elements.surface import tiles
 from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
 from ...tolerances import CERTIFIED, LAST_DIGITS
-from .entries import Entries, Pairs
+from .entries import BlockEntries, Pairs
 from .fits import fits
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class RecognisedCells:
     """Elements of a mesh."""
 
     # (m, k) by kind, meshio's names and order, positively oriented; empty where none was recognised
@@ -40,7 +40,7 @@ class Cells:
         """Whether the cells re-assemble to the given matrix."""
         return bool(self.blocks) and bool(np.isfinite(self.backward_error))
 
-    def among(self, nodes: NDArray[np.bool_]) -> Cells:
+    def among(self, nodes: NDArray[np.bool_]) -> RecognisedCells:
         """The cells all of whose nodes are among some, (n,) bool."""
         kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
         if all(some.all() for some in kept):
@@ -66,7 +66,7 @@ def coupled(nodal: NodalMatrix, points: NDArray[np.float64], least: float = LAST
 
 def recognise_cells(
     nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None, allowed: float = CERTIFIED
-) -> Cells:
+) -> RecognisedCells:
     """Find cells that re-assemble to the matrix: of one kind, or triangles beside quadrilaterals.
 
     Entries may be off by what is `allowed`, relative to the largest of their row.
@@ -82,9 +82,9 @@ def recognise_cells(
     """
     graph, known = coupled(nodal, points), determined(points)
     every = coupled(nodal, points, 0.0)  # weak cells between stiff ones may have less than the last digits
-    ways = [Entries.of(nodal, known, likely, allowed) for likely in (surrounded(nodal, valid_pairs(nodal)), None)]
+    ways = [BlockEntries.of(nodal, known, likely, allowed) for likely in (surrounded(nodal, valid_pairs(nodal)), None)]
     ways = ways if (ways[0].complete != ways[0].sure).any() else ways[:1]
-    found = Cells()
+    found = RecognisedCells()
     for couplings in (graph, every) if len(every.row) > len(graph.row) else (graph,):
         for entries in ways:
             other = _recognised(points, couplings, entries, ratio)
@@ -94,12 +94,14 @@ def recognise_cells(
     return found
 
 
-def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
+def _recognised(
+    points: NDArray[np.float64], graph: Graph, entries: BlockEntries, ratio: float | None
+) -> RecognisedCells:
     """Cells that explain most entries.
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
-    best, most = Cells(), 0
+    best, most = RecognisedCells(), 0
     for blocks in candidates(graph, points) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
         if told is None or len(told.key) <= most:
@@ -114,7 +116,7 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
             best, most = replace(found, shown=told.shown()), len(told.key)
         elif not best.blocks and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
             # without certificate; that cliques lie side by side is no evidence of linear simplices
-            best = Cells({one.kind.name: one.cells for one in seen})
+            best = RecognisedCells({one.kind.name: one.cells for one in seen})
         if most == len(entries.key):
             break
     return best
@@ -127,7 +129,7 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
 
 def _accepted(
     blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float, hidden: int, allowed: float
-) -> Cells | None:
+) -> RecognisedCells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
@@ -140,4 +142,4 @@ def _accepted(
     mu = lame[carries, 1]
     if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit, hidden=hidden)
+    return RecognisedCells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit, hidden=hidden)

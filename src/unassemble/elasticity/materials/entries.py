@@ -18,7 +18,7 @@ from ...tolerances import CERTIFIED, LAST_DIGITS
 
 
 @dataclass(frozen=True, eq=False)
-class Entries:
+class BlockEntries:
     """Blocks above the diagonal that complete cells alone explain; see :func:`.cells.recognise_cells`."""
 
     n: int  # nodes
@@ -37,7 +37,7 @@ class Entries:
         known: NDArray[np.bool_],
         likely: NDArray[np.bool_] | None = None,
         allowed: float = CERTIFIED,
-    ) -> Entries:
+    ) -> BlockEntries:
         """Those of a matrix between nodes whose places are `known`, (n,); cells that have others are as good as lost.
 
         Nodes that are `likely`, (n,), count as complete though not every row shows it.
@@ -66,7 +66,7 @@ class Entries:
         """Largest of the values relative to their row."""
         return float(np.abs(self.value / self.size[:, None, None]).max(initial=0))
 
-    def at(self, place: NDArray[np.int64]) -> Entries:
+    def at(self, place: NDArray[np.int64]) -> BlockEntries:
         """Some of them."""
         return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
 
@@ -79,7 +79,7 @@ class Entries:
         np.logical_or.at(seen, j, entry.any(axis=1))
         return seen
 
-    def explained_by(self, pairs: Sequence[Pairs], graph: Graph) -> Entries | None:
+    def explained_by(self, pairs: Sequence[Pairs], graph: Graph) -> BlockEntries | None:
         """Entries that cells of all kinds explain; None if some belong to no cell, and not since a cell lost a node.
 
         A node may have lost a neighbour without a trace, where their entry was zero: the middle of a straight side of a
@@ -108,7 +108,7 @@ class Pairs:
     flip: NDArray[np.bool_]  # whether the entry is that of the pair the other way round
 
     @classmethod
-    def of(cls, cells: NDArray[np.int64], entries: Entries) -> Pairs:
+    def of(cls, cells: NDArray[np.int64], entries: BlockEntries) -> Pairs:
         """Those of cells (m, k)."""
         a, b = np.triu_indices(cells.shape[1], 1)
         i, j = cells[:, a], cells[:, b]
@@ -126,7 +126,7 @@ class Pairs:
         return np.asarray(self.there.any(axis=1))
 
 
-def claims(pairs: Sequence[Pairs], entries: Entries) -> NDArray[np.int64]:
+def claims(pairs: Sequence[Pairs], entries: BlockEntries) -> NDArray[np.int64]:
     """(e,) how many cells contribute to each entry."""
     place = np.concatenate([one.place[one.there] for one in pairs])
     return np.bincount(place, minlength=len(entries.key))
@@ -140,7 +140,7 @@ def added(total: NDArray[np.float64], place: NDArray[np.int64], blocks: NDArray[
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class MaterialModel:
     """How the matrix depends on the material: cells (m, k) of a kind on points (n, d), integrated by a rule."""
 
     points: NDArray[np.float64]
@@ -149,7 +149,7 @@ class Model:
     rule: Rule
 
     def contributions(
-        self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)
+        self, pairs: Pairs, entries: BlockEntries, some: NDArray | slice = slice(None)
     ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
         """What unit Lame coefficients, (1, 0) and (0, 1), of some cells add to the entries of their pairs, by batches.
 
@@ -166,7 +166,7 @@ class Model:
             unit[:, turned] = unit[:, turned].swapaxes(-1, -2)
             yield batch, unit * entries.told[own.place[batch]] if partial else unit
 
-    def most_added(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
+    def most_added(self, pairs: Pairs, entries: BlockEntries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m,) the most that each cell with coefficients (m, 2) adds to an entry, relative to the size of its rows."""
         most = np.zeros(len(self.cells))
         for batch, unit in self.contributions(pairs, entries):
@@ -175,7 +175,7 @@ class Model:
             most[batch] = relative.max(axis=1)
         return most
 
-    def assembled(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
+    def assembled(self, pairs: Pairs, entries: BlockEntries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
         """(e, d, d) entries of cells with coefficients (m, 2)."""
         total = np.zeros(entries.value.size)
         for batch, unit in self.contributions(pairs, entries):
@@ -184,7 +184,7 @@ class Model:
             added(total, pairs.place[batch][there], part[there])
         return total.reshape(entries.value.shape)
 
-    def operator(self, pairs: Pairs, entries: Entries) -> sp.csr_array:
+    def operator(self, pairs: Pairs, entries: BlockEntries) -> sp.csr_array:
         """(e d d, 2 m) what coefficients add to the entries, relative to their size."""
         dd = self.kind.dim**2
         rows, columns, values = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0)]

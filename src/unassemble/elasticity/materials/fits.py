@@ -16,7 +16,7 @@ from ...elements.reference import Rule, rules
 from ...elements.surface import contested
 from ...linalg import threads
 from ...tolerances import ALIKE, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
-from .entries import Entries, Model, Pairs, added, claims
+from .entries import BlockEntries, MaterialModel, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
 _LARGEST = 50_000_000  # numbers in a least-squares problem
@@ -31,13 +31,17 @@ _FOUR_DIGITS = 1e4  # by which factor what a cell adds to an entry exceeds what 
 Fit = tuple[Sequence[Block], NDArray[np.float64], float, int]
 
 
-def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries, ratio: float | None) -> Iterator[Fit]:
+def fits(
+    points: NDArray[np.float64], blocks: Sequence[Block], entries: BlockEntries, ratio: float | None
+) -> Iterator[Fit]:
     """Lame coefficients of the candidates, in the ways that suit their kinds, the simplest first.
 
     They are linear simplices, cells with entries of their own, or the one beside the other, and explain the entries;
     lambda / mu is the `ratio` where it is one number.
     """
-    simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
+    simple = [
+        MaterialModel(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex
+    ]
     beside = [Pairs.of(one.cells, entries) for one in simple]
     rich = [one for one in blocks if not one.kind.linear_simplex]
     lame, hidden = [np.empty((0, 2))], 0
@@ -45,7 +49,7 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
         rule = _likely_rule(points, one, entries, beside)
         if rule is None:
             return
-        found, entries, unsure = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
+        found, entries, unsure = cell_by_cell(MaterialModel(points, one.cells, one.kind, rule), entries, beside)
         lame.append(found)
         hidden += unsure
     if not simple:
@@ -60,7 +64,7 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
             yield blocks, np.vstack([coefficients, *lame]), rest.largest, hidden + unsure
 
 
-def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequence[Pairs]) -> Rule | None:
+def _likely_rule(points: NDArray, block: Block, entries: BlockEntries, beside: Sequence[Pairs]) -> Rule | None:
     """The quadrature rule that fits a few cells best by the entries that are theirs alone, None if none does."""
     pairs = Pairs.of(block.cells, entries)
     alone = claims((pairs, *beside), entries) == 1
@@ -70,7 +74,7 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
     few = entries.at(np.unique(pairs.place[some][own[some]]))
     best, chosen = np.inf, None
     for rule in rules(block.kind) if len(few.key) else ():
-        found, rest, _ = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
+        found, rest, _ = cell_by_cell(MaterialModel(points, block.cells[some], block.kind, rule), few)
         # Where geometry is affine they all fit.
         if np.isfinite(found).all() and rest.largest <= min(entries.allowed, LITTLE * best):
             best, chosen = rest.largest, rule
@@ -78,8 +82,8 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
 
 
 def cell_by_cell(
-    model: Model, entries: Entries, beside: Sequence[Pairs] = ()
-) -> tuple[NDArray[np.float64], Entries, int]:
+    model: MaterialModel, entries: BlockEntries, beside: Sequence[Pairs] = ()
+) -> tuple[NDArray[np.float64], BlockEntries, int]:
     """(m, 2) coefficients of cells from the entries that no other contributes to, and what they leave of all entries.
 
     The third result counts weak cells of which what is left of stronger ones hides the material.
@@ -142,7 +146,9 @@ def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size
     return found
 
 
-def _one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[np.float64], Entries]:
+def _one_material(
+    model: MaterialModel, entries: BlockEntries, ratio: float
+) -> tuple[NDArray[np.float64], BlockEntries]:
     """(m, 2) coefficients (ratio mu, mu) of cells, the same for all, and what they leave of the entries."""
     unit = np.ones((len(model.cells), 1)) * [ratio, 1]
     full = model.assembled(Pairs.of(model.cells, entries), entries, unit)
@@ -154,7 +160,7 @@ def _one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray
     return mu * unit, replace(entries, value=entries.value - mu * full)
 
 
-def _fewest(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entries, int]:
+def _fewest(model: MaterialModel, entries: BlockEntries) -> tuple[NDArray[np.float64], BlockEntries, int]:
     """(m, 2) coefficients of as few cells as explain the entries as well as all candidates do, and what they leave.
 
     Candidates that carry no material come out as weak cells, by rounding. A weak cell of the body is told from these
@@ -183,7 +189,7 @@ def _fewest(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entrie
     return lame, rest, int((weak | gone).sum())
 
 
-def _uncertain(model: Model, entries: Entries, lame: NDArray, noise: float) -> NDArray[np.bool_]:
+def _uncertain(model: MaterialModel, entries: BlockEntries, lame: NDArray, noise: float) -> NDArray[np.bool_]:
     """(m,) weak cells whose coefficients (m, 2) errors of the entries change by more than the fourth digit.
 
     Errors are drawn at random, as large as the `noise`, relative to their row. Several weak cells together may be free
@@ -201,7 +207,7 @@ def _uncertain(model: Model, entries: Entries, lame: NDArray, noise: float) -> N
     return np.asarray(weak & (_FOUR_DIGITS * np.abs(change).max(axis=1) > size))
 
 
-def _least_squares(model: Model, entries: Entries) -> tuple[NDArray[np.float64], Entries]:
+def _least_squares(model: MaterialModel, entries: BlockEntries) -> tuple[NDArray[np.float64], BlockEntries]:
     """(m, 2) coefficients that fit entries best, zero where none shows, and what they leave of the entries.
 
     Neighbours share most of their entries, and candidates that carry no material get zeros.
