@@ -30,7 +30,9 @@ def cases():
 
 @pytest.mark.parametrize(("kind", "number"), list(cases()))
 def test_nothing_is_certified_and_wrong(kind, number):
-    one = tried(kind, number, seconds=4.0)  # those that take longer are not judged
+    one = tried(kind, number, seconds=4.0)
+    if one.word == "slow":
+        pytest.skip("no answer within four seconds of processor time, and so nothing to judge")
     assert one.word not in ("WRONG", "ERROR"), f"{one.again}\n{one.said}"
 
 
@@ -154,6 +156,8 @@ def test_another_mesh_with_the_same_entries_is_named_and_not_proved():
     assert outcome_of(truth, replace(found, verdict=searched, warnings=()))[0] == "WRONG"
     named = ("other surfaces have the same entries",)
     assert outcome_of(truth, replace(found, verdict=searched, warnings=named))[0] == "alias"
+    free = ("the sign of the scale is free: its point reflection fits the matrix as well",)
+    assert outcome_of(truth, replace(found, verdict=searched, warnings=free))[0] == "WRONG"
 
 
 @pytest.mark.parametrize("kind", ["square", "points"])

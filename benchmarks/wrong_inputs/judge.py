@@ -23,7 +23,8 @@ from assembled import ELEMENTS, stiffness  # isort: skip
 CLOSE = 1e-6  # of points, relative to the diameter of their piece, where the answer has no error bar
 SAME = 1e-11  # of entries, relative to their rows: as near as another assembler comes to the very entries
 SIZELESS = ("truss", "elasticity", "structure")  # matrices of displacements alone tell no size
-NAMES = re.compile(r"\b(other|others|another|also|as well|same entries)\b")
+#: What a warning says that names another model with the very entries; that a sign is free does not.
+NAMES = re.compile("the same entries|may fit as well|has exactly these entries")
 
 
 def outcome_of(truth: Truth, found: Recovery) -> tuple[str, str]:

@@ -47,10 +47,6 @@ class Reason:
         """The same with another advice."""
         return Reason(*self.sentences, advice=advice)
 
-    def before(self, *sentences: str) -> Reason:
-        """The same, followed by further sentences."""
-        return Reason(*self.sentences, *sentences, advice=self.advice)
-
     def __str__(self) -> str:
         return sentences(self.sentences)
 

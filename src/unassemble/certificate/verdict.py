@@ -14,6 +14,7 @@ A recovery finds out what speaks for its mesh and what against it. That is a :cl
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -98,32 +99,36 @@ class Verdict:
         """The verdict on the same mesh when another turns up that fits as well."""
         if self.objections:
             return self
-        return Verdict("ambiguous", another.sentences, another.advice)
+        return Verdict("ambiguous", (*another.sentences, *self.reasons), another.advice or self.advice)
 
     def explained(self, *reasons: str, advice: str | None = None) -> Verdict:
-        """The same verdict for other, better reasons; and with another advice, if one is given."""
-        return replace(self, reasons=reasons, advice=self.advice if advice is None else advice)
-
-    def unproved(self) -> Verdict:
-        """The same where that no other mesh fits is not proved."""
-        if self.uniqueness == "proved":
-            return replace(self, uniqueness="searched")
-        return self
+        """The same verdict for better reasons, which come first, and with another advice, if one is given."""
+        better = Reason(*reasons, advice=self.advice if advice is None else advice)
+        if self.objections:
+            return _uncertified((better, *self.objections))
+        return replace(self, reasons=better.sentences, advice=better.advice)
 
 
 def judge(findings: Findings) -> Verdict:
     """What a mesh is worth."""
     objections = findings.objections
     if not objections and not findings.error <= findings.allowed:
-        worst = (
-            f"the matrix is given back to {findings.error:.1e} (relative) only, where {findings.allowed:g} is allowed"
-        )
-        objections = (Reason(worst),)
+        objections = (_not_given_back(findings),)
     if objections:
         return _uncertified(objections)
     if findings.another is not None:
         return Verdict("ambiguous", findings.another.sentences, findings.another.advice)
     return Verdict(findings.unique, findings.fits)
+
+
+def _not_given_back(findings: Findings) -> Reason:
+    """That an entry differs too much, or that none could be compared."""
+    if math.isnan(findings.error):
+        return Reason("no entry of the matrix could be compared with the mesh")
+    if math.isinf(findings.error):
+        return Reason("a cell is flat, or an entry of the mesh belongs to a row that has none")
+    much = f"{findings.error:.1e} (relative) only, where {findings.allowed:g} is allowed"
+    return Reason(f"the matrix is given back to {much}")
 
 
 def _uncertified(objections: tuple[Reason, ...]) -> Verdict:

@@ -117,7 +117,7 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
     if not found.unread:
-        if linear or mesh.chi_square is not None or mesh.uniqueness or mesh.backward_error <= CERTIFIED:
+        if linear or mesh.chi_square is not None or mesh.backward_error <= CERTIFIED:
             return mesh
         advice = _where_nothing_fits(found, matrix)
         reasons = mesh.verdict.reasons[0], *found.evidence[-1:]

@@ -8,7 +8,6 @@ from .finish import (
     Comparison as Comparison,
     Examined as Examined,
     Placed as Placed,
-    Residual as Residual,
     finish as finish,
 )
 from .mechanical import Body as Body, Evidence as Evidence, Mechanical as Mechanical, Structure as Structure

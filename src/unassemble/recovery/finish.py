@@ -25,17 +25,6 @@ class Comparison(Protocol):
         """At most so many entries that fit worst, (k, 2), worst first, and their misfits, (k,)."""
 
 
-@dataclass(frozen=True)
-class Residual:
-    """A comparison that is one number: no entries are told apart."""
-
-    backward_error: float
-
-    def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """None."""
-        return np.empty((0, 2), np.int64), np.empty(0)
-
-
 Mesh = TypeVar("Mesh", bound=Recovery)
 Compared = TypeVar("Compared", bound=Comparison)
 

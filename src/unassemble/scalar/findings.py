@@ -32,8 +32,8 @@ class Twice:
         return self.written.backward_error
 
     def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The entries that fit worst, those that stand out before others."""
-        return self.written.worst(count, self.evidence.suspects)
+        """The entries that fit worst, those that stand out before others; none where only coordinates lose digits."""
+        return self.written.worst(0 if self.near.passes else count, self.evidence.suspects)
 
 
 @dataclass(frozen=True, eq=False)
