@@ -15,6 +15,13 @@ def body(kind, **material):
     return permuted_nodes(stiffness(kind, box(kind, COUNTS[kind[:3]], perturb=0.2), **material), seed=1)
 
 
+def written(matrix, digits):
+    """Entries with so many digits."""
+    matrix = sp.csr_array(matrix)
+    data = np.array([float(f"{x:.{digits - 1}e}") for x in matrix.data])
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
 def on_the_result(found, matrix, **changed):
     """The certificate of a result with some of its arrays changed."""
     arrays = {"points": found.points, "lame": found.lame} | changed
@@ -111,8 +118,9 @@ def test_what_supports_leave_of_elements_is_a_stiffness_and_what_a_wrong_entry_l
     found = recover(matrix)
     assert found.certified
     certificate = on_the_result(found, matrix)
-    assert len(certificate.silent)
-    assert set(certificate.silent) <= set(beside)
+    silent = certificate.silent(1e-9)
+    assert len(silent)
+    assert set(silent) <= set(beside)
     assert certificate.could_be_elements(1e-8)
     assert any("may be missing" in warning for warning in found.warnings)
     entry = matrix.tocoo()
@@ -123,3 +131,22 @@ def test_what_supports_leave_of_elements_is_a_stiffness_and_what_a_wrong_entry_l
     changed[i, j] = changed[j, i] = 20 * matrix[i, j]
     assert not on_the_result(found, sp.csr_array(changed)).could_be_elements(1e-8)
     assert not recover(sp.csr_array(changed)).certified
+
+
+@pytest.mark.parametrize("digits", [None, 12, 8])
+def test_few_digits_hide_no_wrong_entry(digits):
+    """What is an objection to exact entries stays one where they are written with few digits."""
+    case = body("quad-q1", lam=1.5)
+    right = case.matrix if digits is None else written(case.matrix, digits)
+    found = recover(right)
+    assert found.certified
+    assert not any("may be missing" in warning for warning in found.warnings)
+    assert "in all rows but" not in found.reason
+    node = found.node_of_row
+    entry = sp.csr_array(case.matrix).tocoo()
+    near = (node[entry.row] < node[entry.col]) & (np.abs(entry.data) > 0.1)
+    for i, j in ((int(entry.row[near][0]), int(entry.col[near][0])), (0, len(node) - 1)):
+        wrong = sp.lil_array(case.matrix)
+        wrong[i, j] = wrong[j, i] = wrong[i, j] + 0.3
+        changed = sp.csr_array(wrong)
+        assert not recover(changed if digits is None else written(changed, digits)).certified

@@ -35,17 +35,25 @@ class BodyCertificate:
     remainder: sp.csr_array | None = None
 
     def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The pairs that fit worst, worst first, and their misfits: those above the bound."""
-        above = np.flatnonzero(self.misfits > CERTIFIED)
+        """The entries that fit worst, each once, worst first, and their misfits: those above the bound.
+
+        Of identities there are none, since each belongs to a whole row.
+        """
+        row, column = self.pairs.T
+        above = np.flatnonzero((self.misfits > CERTIFIED) & (row <= column) & (self.remainder is not None))
         order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
         return self.pairs[order], self.misfits[order]
 
-    @property
-    def silent(self) -> NDArray[np.int64]:
-        """Rows of which cells leave something that they do not have to explain, next to supports for one."""
+    def silent(self, allowed: float) -> NDArray[np.int64]:
+        """Rows that were not compared and of which cells leave more than is `allowed`, as next to supports.
+
+        Those of which they leave most come first.
+        """
         if self.remainder is None:
             return np.empty(0, np.int64)
-        return np.unique(self.remainder.tocoo().row)
+        rest = np.asarray(abs(self.remainder).max(axis=1).todense()).ravel()
+        order = np.argsort(-rest, kind="stable")
+        return order[(rest[order] > allowed) & ~self.compared[order]]
 
     def could_be_elements(self, allowed: float) -> bool:
         """Whether what cells leave may be the stiffness of other elements, of which supports took nodes away.

@@ -13,10 +13,10 @@ from ..linalg import blas_threads
 from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import NodeNumbering
-from ..nodes.rounded import known_to
+from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Body, Examined, Placed, finish
-from ..tolerances import ALIKE, CERTIFIED, PLACED
-from ..words import GIVE_NUMBERING, Reason, count_of
+from ..tolerances import ALIKE, CERTIFIED, SIGMAS
+from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import RecognisedCells, recognise_cells
 from .nullspace.certificate import residuals
@@ -24,16 +24,15 @@ from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
 from .positions import solve
 from .verdict import (
-    BESIDE_CELLS,
-    NO_ELEMENTS,
     NOTHING_CHECKED,
     RESTS_ON_PLANES,
     WEAK_AND_UNKNOWN,
+    against_body,
+    beside_cells,
     contrast,
     examined,
     hidden_elements,
     no_positions,
-    not_given_back,
 )
 
 
@@ -128,8 +127,9 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
             sure,
             advice=GIVE_NUMBERING,
         )
-    # How well positions are known was asked of entries with few digits: decimals are few for weak rows.
-    allowed = np.inf if request.rounding else CERTIFIED
+    allowed = np.full(len(numbering.node_of_row), CERTIFIED)
+    if request.rounding:
+        allowed = np.maximum(allowed, _rounded_rows(request.rounding, nodal, solution, bar))
 
     def place() -> Placed[Body]:
         moved = anchored(request, rows, placed, component, 1.0, free=free)
@@ -150,18 +150,15 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
         fit = found.backward_error if found.certified else error
         return BodyComparison(_certificate(request, body, elements=found.certified), fit)
 
-    def examine(body: Body, compared: BodyComparison) -> Examined:
-        if not objections and compared.certificate.backward_error > allowed:  # NaN where it compares nothing
-            objections.append(not_given_back(compared.certificate))
-        exact = request.rounding is None
-        if not objections and exact and not compared.certificate.could_be_elements(PLACED):
-            objections.append(NO_ELEMENTS)
+    def examine(_: Body, compared: BodyComparison) -> Examined:
+        certificate, most = compared.certificate, float(allowed.max())
+        beside = certificate.silent(most)
+        against = [*objections, *against_body(certificate, beside, allowed)]
         fits, remarks = sure, []
-        if beside := len(compared.certificate.silent):
-            fits = f"{sure}, but for {beside:,} of its {len(rows.node_of_row):,} rows"
-            remarks = [f"{count_of(beside, 'row has', 'rows have')} {BESIDE_CELLS}"]
-        found_out = Findings((fits,), compared.backward_error, tuple(objections), another, allowed=allowed)
-        return Examined(found_out, remarks)
+        if len(beside):
+            fits = f"{sure}, in all rows but {len(beside):,} of {len(allowed):,}"
+            remarks = [beside_cells(len(beside))]
+        return Examined(Findings((fits,), compared.backward_error, tuple(against), another, allowed=most), remarks)
 
     return finish(request.clock, place, compare, examine)
 
@@ -177,11 +174,29 @@ class BodyComparison:
     def backward_error(self) -> float:
         """That of the certificate or, of a body of which it can compare nothing, that of the fit."""
         error = self.certificate.backward_error
-        return error if np.isfinite(error) else self.fit
+        return self.fit if np.isnan(error) else error
 
     def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The entries that fit worst, and their misfits."""
         return self.certificate.worst(count)
+
+
+def _rounded_rows(rounding: Rounding, nodal: NodalMatrix, solution: Solution, bar: Known | None) -> NDArray[np.float64]:
+    """(N,) how far off entries with few digits may be, relative to their row: they, and those of positions from them.
+
+    Decimals are few for weak rows. Positions that are off by some part of the diameter change the entries of the
+    shortest distance most.
+    """
+    unit = np.asarray(abs(rounding.unit).max(axis=1).todense()).ravel()
+    matrix = abs(rounding.exact)
+    largest = np.asarray((matrix - sp.diags_array(matrix.diagonal())).max(axis=1).todense()).ravel()
+    known = determined(solution.points)
+    pair = known[nodal.node] & known[nodal.indices] & (nodal.node != nodal.indices)
+    apart = solution.points[nodal.node[pair]] - solution.points[nodal.indices[pair]]
+    shortest = np.linalg.norm(apart, axis=1).min(initial=np.inf)
+    diameter = np.linalg.norm(np.ptp(solution.points[known], axis=0)) if known.any() else 0.0
+    moved = bar.error * diameter / shortest if bar and shortest > 0 else 0.0
+    return rounding.spread + SIGMAS * (unit / np.where(largest > 0, largest, np.inf) + moved)
 
 
 def _certificate(request: Request, body: Body, *, elements: bool) -> BodyCertificate:

@@ -4,14 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..certificate import BodyCertificate
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import NodeNumbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import CERTIFIED, SMALL
-from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
+from ..tolerances import CERTIFIED, PLACED, SMALL
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences, words_of
 from .materials.cells import RecognisedCells
 from .nullspace.placing import Solution
 
@@ -24,17 +25,9 @@ RESTS_ON_PLANES = Reason(
     advice=WITHOUT_SUPPORTS,
 )
 
-NO_ELEMENTS = Reason(
-    "what the elements leave of the entries between nodes with positions is not the stiffness of other elements, which "
-    "would be positive semidefinite: an entry is wrong, or an element is missing",
-    advice="check the entries next to rows that do not annihilate translations",
-)
-BESIDE_CELLS = (
-    "entries that the listed elements do not explain, as next to supports, where elements have lost a node: an element "
-    "all of whose nodes are in such rows, or coupled to them, may be missing"
-)
 WEAK_AND_UNKNOWN = Reason(
-    "neighbouring nodes differ in stiffness by more than six digits, and no elements re-assemble that explain it"
+    "neighbouring nodes differ in stiffness by more than six digits, and no elements were found that explain it",
+    advice="write the entries with all their digits, or leave weak elements out",
 )
 
 
@@ -50,11 +43,37 @@ def hidden_elements(count: int) -> Reason:
     return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
-def not_given_back(certificate: BodyCertificate) -> Reason:
-    """That the body as written does not give the rows of the matrix back."""
-    rows = count_of(len(np.unique(certificate.worst(len(certificate.misfits))[0])), "row")
-    error = certificate.backward_error
-    return Reason(f"{rows} of the matrix are not given back by the body as it is written: the error is {error:.1e}")
+def against_body(
+    certificate: BodyCertificate, beside: NDArray[np.int64], allowed: NDArray[np.float64]
+) -> Iterator[Reason]:
+    """What the certificate says against a body as it is written.
+
+    Errors are `allowed` by row, (N,); `beside` are rows that it does not compare and does not explain either, those
+    first of which elements leave most.
+    """
+    if not len(certificate.misfits):
+        yield NOTHING_CHECKED
+        return
+    bound = allowed[certificate.pairs].max(axis=1)
+    wrong = np.flatnonzero(~(certificate.misfits <= bound))
+    if len(wrong):
+        worst = wrong[np.argmax(certificate.misfits[wrong])]
+        rows = count_of(len(np.unique(certificate.pairs[wrong, 0])), "row")
+        most = f"row {certificate.pairs[worst, 0]} is off by {certificate.misfits[worst]:.1e} of its largest entry"
+        yield Reason(f"the body as it is written does not give {rows} of the matrix back: {most}")
+    elif not certificate.could_be_elements(max(PLACED, float(allowed.max()))):
+        rows = words_of(beside[:2]) if len(beside) else "that were not compared"
+        yield Reason(
+            f"the elements leave entries in rows {rows} that no other element or spring has",
+            "an entry is wrong there, or an element is missing",
+            advice="check the entries of these rows",
+        )
+
+
+def beside_cells(count: int) -> str:
+    """That rows next to supports are not explained by the elements that are listed."""
+    lost = f"{count_of(count, 'row is', 'rows are')} not compared: elements next to them have lost nodes"
+    return f"{lost}, as to supports. An element all of whose nodes lie there may be missing from the list"
 
 
 def examined(

@@ -66,7 +66,7 @@ class Anchored:
 
     def objections(self, before: str) -> Iterator[Reason]:
         """That coordinates lost more digits than entries would bear; `before`: what holds without that."""
-        if self.lost > SUMMED:
+        if not self.lost <= SUMMED:
             yield Reason(
                 f"the anchors lie so far from the origin that coordinates, as written, are off by {self.lost:.1e} edge "
                 "lengths: they have too few digits left",

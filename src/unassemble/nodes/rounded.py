@@ -140,7 +140,7 @@ class Known:
         allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
         if not (misfit <= allowed and self.explained):
             yield Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
-        if self.error > needed:
+        if not self.error <= needed:
             yield Reason(f"{said}, and positions may be off by {self.error:.0e} of the size")
 
     def within(self, rounding: Rounding | None) -> str:
