@@ -13,7 +13,9 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.models.poisson import laplace, mass
 
 from unassemble import InputError, RecoveryError, recover
+from unassemble.certificate import certify_mesh
 from unassemble.cli import main
+from unassemble.matrix import check_matrix
 
 DENSITY, MODULUS = 7.8, 5.0
 
@@ -193,6 +195,44 @@ def test_one_anchor_tells_no_size():
     assert found.density == 1.0
     np.testing.assert_allclose(found.points[7], (3, -2), atol=1e-12)
     np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-9)
+
+
+@pytest.mark.parametrize("place", [1e3, 1e5])
+def test_the_mesh_in_its_size_is_held_against_the_stiffness_matrix_again(place):
+    """Far from the origin it has fewer digits than the mesh that the stiffness matrix alone gives."""
+    K, M, _ = scalar(moved(LAKE), density=1.0)
+    found, alone = recover(K, mass=M, anchors=[(7, place, place)]), recover(K)
+    assert found.certified
+    again = certify_mesh(check_matrix(K), found).backward_error
+    assert found.backward_error == max(again, recover(K, anchors=[(7, place, place)]).backward_error)
+    assert found.backward_error > 10 * alone.backward_error
+    assert "in this size the stiffness matrix to" in found.reason
+
+
+def test_a_tensor_and_a_size():
+    basis = fem.Basis(moved(LAKE), fem.ElementTriP1())
+    form = fem.BilinearForm(lambda u, v, w: 2 * u.grad[0] * v.grad[0] + u.grad[1] * v.grad[1])
+    (K, M), place = shuffled(form.assemble(basis), mass.assemble(basis))
+    true = basis.doflocs.T[place]
+    way = true[1] - true[0]
+    others = (true - true[0]).mean(axis=0)
+    side = "left" if way[0] * others[1] - way[1] * others[0] > 0 else "right"
+    degrees = np.degrees(np.arctan2(way[1], way[0]))
+    found = recover(K, mass=M, tensor=(2.0, 0.0, 1.0), direction=(0, 1, degrees), handed=side)
+    assert found.certified, found.reason
+    assert found.backward_error < 1e-11
+    assert "in this size the stiffness matrix to" in found.reason
+    np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["scalar", "tetrahedra"])
+def test_a_small_mesh_far_from_the_origin(name):
+    """Digits are lost there; this is no other mass matrix."""
+    K, M, true = scalar(moved(LAKE), density=1.0) if name == "scalar" else elastic(*BODIES[name])
+    dim = true.shape[1]
+    with pytest.raises(RecoveryError, match=r"too few digits that far from the origin: subtract a point near \(1000"):
+        recover(K, mass=1e-6**dim * M, anchors=[(0, *[1e3] * dim)])
+    assert recover(K, mass=1e-6**dim * M).certified
 
 
 def test_areas_are_held_against_no_mass():

@@ -157,4 +157,6 @@ def recover(
             return Question(checked, clock, about, frame, planar, given, realise).answer()
 
         with thread_limit(threads):
-            return answer(matrix) if mass is None else weighed(answer, matrix, mass, frame.anchors)
+            if mass is None:
+                return answer(matrix)
+            return weighed(answer, matrix, mass, frame.anchors, frame.tensor and frame.tensor.coefficients)

@@ -116,7 +116,8 @@ class ScalarReadings:
     def _without_boundary_terms(self) -> PlanarMesh | None:
         if self.matrix.replaced is not None or self.options.noise is not None:
             return None
-        return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
+        tensor = self.placement.coefficients
+        return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale, self.clock, tensor)
 
     @cached_property
     def _given(self) -> tuple[OperatorMatrix, NDArray[np.bool_] | None]:

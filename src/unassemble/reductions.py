@@ -34,6 +34,11 @@ class ConstantTensor:
             raise InputError(f"`tensor` {values} is degenerate up to rounding and cannot be undone")
 
     @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """(kxx, kxy, kyy), as the certificate takes them."""
+        return self.kxx, self.kxy, self.kyy
+
+    @property
     def root_determinant(self) -> float:
         """The root of det K."""
         size = max(self.kxx, self.kyy)  # taken out, so that no product overflows or vanishes

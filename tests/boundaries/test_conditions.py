@@ -12,6 +12,8 @@ from skfem.models import laplace
 
 from meshes import SHARED, largest_error, needs_shared, random_mesh
 from unassemble import RecoveryError, recover
+from unassemble.certificate import certify_with_boundary_terms
+from unassemble.matrix import check_matrix
 
 
 def corpus(name):
@@ -153,6 +155,45 @@ def test_robin(mesh, alpha):
     assert determined(found, points) == 1
     assert "was taken off" in " ".join(found.warnings)
     assert found.scale == pytest.approx(-0.3, rel=1e-9)
+
+
+@pytest.mark.parametrize("term", ["Robin", "flow"])
+def test_the_matrix_with_its_terms_is_what_is_given_back(term):
+    """All its entries and its diagonal are compared, not those of the Laplacian that was found in it."""
+    mesh = annulus()
+    matrix, _ = robin(mesh, 3.0) if term == "Robin" else convected(mesh, (3.0, -1.0))
+    matrix = sp.csr_array((matrix + matrix.T) / 2)
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert "with the terms on its boundary" in found.reason
+    assert found.uniqueness == "searched"
+    assert found.n_fitting == found.n_entries == sp.triu(matrix).nnz
+    again = certify_with_boundary_terms(check_matrix(matrix), found)
+    assert again.backward_error == found.backward_error <= 1e-9
+    assert again.spare > 0
+
+
+@pytest.mark.parametrize("place", ["side", "row of the boundary", "row inside", "term of one side"])
+def test_a_wrong_entry_is_not_explained_by_terms(place):
+    """The factors of the certificate are too few to follow it."""
+    mesh = jittered(seed=3)
+    matrix, _ = robin(mesh, 3.0)
+    found = recover(matrix)
+    a, b = found.boundary[0]
+    inside = np.setdiff1d(np.arange(matrix.shape[0]), found.boundary)[0]
+    wrong = sp.lil_array(matrix)
+    if place == "row inside":
+        wrong[inside, inside] += 1e-6
+    elif place == "row of the boundary":
+        wrong[a, a] += 1e-6
+    else:
+        wrong[a, b] += 1e-6
+        wrong[b, a] += 1e-6
+    if place == "term of one side":  # a term of this edge alone
+        wrong[a, a] += 2e-6
+        wrong[b, b] += 2e-6
+    error = certify_with_boundary_terms(check_matrix(sp.csr_array(wrong)), found).backward_error
+    assert 1e-8 < error < 1e-4
 
 
 @pytest.mark.parametrize("mesh", MESHES)

@@ -83,6 +83,8 @@ def test_rectangles_of_quadratic_triangles_are_ambiguous_without_their_zeros(sha
     known = assembled("P2", MeshTri.init_tensor(x, y), c=-3.0, zeros=False)
     found = recover(known.matrix)
     assert (found.status, found.uniqueness) == ("ambiguous", "ambiguous")
+    assert found.verdict.reasons[0].startswith("another mesh has the matrix as well")
+    assert not any(". " in reason for reason in found.verdict.reasons)  # each is one sentence
     assert found.backward_error < 1e-12
     assert largest_error(found.points, known.points) < 1e-12
     (other,) = found.alternatives

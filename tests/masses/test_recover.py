@@ -1,6 +1,7 @@
 """c L + s M from scikit-fem, rows permuted at random: the mesh, its size, and both factors."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,11 @@ from skfem.helpers import dot, grad
 
 from meshes import delaunay, largest_error, random_mesh, triangle_set
 from unassemble import FormatError, MatrixError, RecoveryError, recover
+from unassemble.certificate import Terms
 from unassemble.cli import main
+from unassemble.masses.held import RowSums
+from unassemble.matrix import check_matrix
+from unassemble.words import Reason
 
 
 def assembled(points, triangles, c, s, *, lumped=False, seed=0):
@@ -93,6 +98,46 @@ def test_a_wrong_entry_is_no_certificate():
         dense[pair] *= 1 + 1e-5
     found = recover(dense)
     assert found.status != "certified"
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_the_whole_matrix_is_counted(lumped):
+    """Entries on the diagonal as well as those beside it."""
+    points, triangles = random_mesh(200, seed=3)
+    matrix, _, _ = assembled(points, triangles, 1.0, 300.0, lumped=lumped)
+    found = recover(matrix)
+    assert found.certified
+    assert found.n_fitting == found.n_entries == sp.triu(matrix).nnz
+
+
+def test_what_speaks_against_the_mesh_comes_first():
+    """Objections and other meshes of the Laplacian alone are those of the whole matrix, and no praise precedes them."""
+    points, triangles = random_mesh(100, seed=4)
+    matrix = check_matrix(assembled(points, triangles, 1.0, 50.0)[0])
+    found = recover(assembled(points, triangles, 1.0, 0.0)[0])
+    terms, held = Terms(matrix.diagonal, 50.0), RowSums(matrix)
+    scaled = held.with_terms(replace(found, points=found.points * _size(found, points, triangles)), terms, "c L + s M")
+    assert scaled.certified, scaled.reason
+    reason = Reason("something is wrong", advice="mend it")
+
+    doubtful = replace(scaled, verdict=scaled.verdict.despite(reason))
+    verdict = held.with_terms(doubtful, terms, "c L + s M").verdict
+    assert (verdict.objections, verdict.reasons, verdict.advice) == ((reason,), reason.sentences, "mend it")
+
+    ambiguous = replace(scaled, verdict=scaled.verdict.beside(Reason("another mesh fits")))
+    verdict = held.with_terms(ambiguous, terms, "c L + s M").verdict
+    assert verdict.status == "ambiguous"
+    assert verdict.reasons[0] == "another mesh fits"
+
+    verdict = held.with_terms(doubtful, replace(terms, reaction=51.0), "c L + s M").verdict
+    assert len(verdict.objections) == 2
+    assert verdict.reasons[0].endswith("(relative) only")
+    assert verdict.objections[1] == reason
+
+
+def _size(found, points, triangles):
+    """How many times as large the true mesh is."""
+    return np.sqrt(areas(points, triangles).sum() / areas(found.points, found.triangles).sum())
 
 
 def test_any_other_diagonal_leaves_no_reaction():

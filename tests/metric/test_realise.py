@@ -1,6 +1,7 @@
 """Coordinates in space, files and the command line."""
 
 import json
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -13,6 +14,8 @@ from surfaces import largest_error, moebius, sheet, surface
 from meshes import random_mesh, specimen, triangle_set
 from unassemble import FormatError, recover
 from unassemble.cli import main
+from unassemble.metric import flattened
+from unassemble.metric.verdict import VARYING
 
 
 def lengths_of(found):
@@ -84,6 +87,14 @@ def test_flat_surfaces_have_points_in_the_plane(tmp_path):
     found.save(tmp_path / "m.npz")
     with np.load(tmp_path / "m.npz") as content:
         assert set(content) >= {"points", "edges", "edge_lengths"}
+
+
+def test_flat_surfaces_keep_what_was_said_of_their_lengths():
+    known = specimen(*random_mesh(100), c=3.0)
+    found, planar = (recover(known.matrix, operator=operator) for operator in ("surface", "laplacian"))
+    lengths = replace(found, warnings=(*planar.warnings, "a stored zero was left out", VARYING))
+    again = flattened(lengths, planar)
+    assert again.warnings == (*planar.warnings, "a stored zero was left out")
 
 
 @pytest.mark.parametrize("realise", [False, True])

@@ -16,22 +16,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ..certificate import BoundaryCertificate, Findings, Unique, Verdict, certify_with_boundary_terms
+from ..clock import Clock
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import left_by_map
-from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, CERTIFIED, ROUNDED
+from ..recovery import Examined, Placed, PlanarMesh, finish
+from ..tolerances import ALIKE, ROUNDED
 from ..topology import Piece
 from ..words import Reason
 
 
 def recover_without_boundary_terms(
-    matrix: OperatorMatrix, plain: Callable[[OperatorMatrix], PlanarMesh], scale: float | None
+    matrix: OperatorMatrix,
+    plain: Callable[[OperatorMatrix], PlanarMesh],
+    scale: float | None,
+    clock: Clock,
+    tensor: tuple[float, float, float] | None = None,
 ) -> PlanarMesh | None:
-    """The certified mesh of a matrix without the terms on its boundary; None where there are no such terms.
+    """The certified mesh of a matrix with terms on its boundary; None where there are no such terms.
 
-    It is certified only where the terms of one factor for each loop and one field, integrated on the mesh as it is
-    written, give entries and row sums back. `plain`: the mesh of a matrix without them; `scale`: c, where it is known.
+    It is certified only where the operator with terms of one factor for each loop and one field, integrated on the mesh
+    as it is written, gives all entries back, those on the diagonal too. `plain`: the mesh of a matrix without terms;
+    `scale`: c, where it is known; `tensor`: (kxx, kxy, kyy) to be undone.
     """
     loops = _Loops.of(matrix)
     if loops is None:
@@ -43,13 +50,34 @@ def recover_without_boundary_terms(
         found = plain(loops.without(matrix, terms))
     except RecoveryError:
         return None
-    if not found.certified or found.node_status.any() or not loops.fits(matrix, terms, found.points):
+    if not found.certified or found.node_status.any():
         return None
     note = (
         "entries on the boundary have a term of their own, a Robin condition or half of a flow through it: row sums "
         "say how much, and it was taken off"
     )
-    return replace(found, warnings=(*found.warnings, note))
+    whole = finish(
+        clock,
+        lambda: Placed(found, (*found.warnings, note)),
+        lambda mesh: certify_with_boundary_terms(matrix, mesh, tensor),
+        lambda _, compared: _examined(compared, found.verdict),
+    )
+    return whole if whole.certified else None
+
+
+def _examined(compared: BoundaryCertificate, known: Verdict) -> Examined:
+    """What is found out about a mesh with terms on its boundary; `known` is what it is worth without them."""
+    error = compared.backward_error
+    fits = (
+        "the operator with the terms on its boundary, re-assembled on this mesh, gives the matrix back to "
+        f"{error:.1e} (relative)"
+    )
+    objections = list(known.objections)
+    if not compared.spare > 0:
+        objections.append(Reason("the boundary has no more edges than its terms have factors, so that any terms fit"))
+    # Other meshes were looked for without terms, or with the same: with others there may be more.
+    unique: Unique = "searched" if known.unique == "proved" else known.unique
+    return Examined(Findings((fits,), error, tuple(objections), unique=unique), fields=compared.entries.counts())
 
 
 def unless_flow(matrix: OperatorMatrix, found: PlanarMesh) -> PlanarMesh:
@@ -150,14 +178,3 @@ class _Loops:
         for end in self.ends.T:
             diagonal[end] -= terms / 3
         return replace(matrix, entries=entries, diagonal=diagonal)
-
-    def fits(self, matrix: OperatorMatrix, terms: NDArray, points: NDArray) -> bool:
-        """Whether terms are those of one factor for each loop and of one field, on a mesh with these points."""
-        along = points[self.ends[:, 1]] - points[self.ends[:, 0]]
-        length = np.linalg.norm(along, axis=1)
-        loops = np.where(self.loop[:, None] == np.arange(self.loop[-1] + 1), length[:, None], 0)
-        design = np.column_stack([loops, along[:, 1], -along[:, 0]])
-        solution, _, rank, _ = np.linalg.lstsq(design, terms, rcond=None)
-        rest = np.abs(design @ solution - terms)
-        row = matrix.row_size[self.ends].min(axis=1)
-        return bool(len(terms) > rank and (rest <= CERTIFIED * row).all())

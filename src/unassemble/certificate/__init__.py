@@ -8,6 +8,10 @@ from .bodies import (
     certify_body as certify_body,
     certify_positions as certify_positions,
 )
+from .boundary import (
+    BoundaryCertificate as BoundaryCertificate,
+    certify_with_boundary_terms as certify_with_boundary_terms,
+)
 from .comparison import Certificate as Certificate, Terms as Terms, compared as compared
 from .lengths import MetricCertificate as MetricCertificate, certify_metric as certify_metric
 from .masses import certify_masses as certify_masses

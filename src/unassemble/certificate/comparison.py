@@ -32,6 +32,13 @@ class Certificate:
     differences: NDArray[np.float64]  # (k,) re-assembled minus given
     flipped: NDArray[np.int64]  # (f,) cells that are flat or turned over: with any of them a mesh is not planar
 
+    def counts(self) -> dict[str, int]:
+        """How many entries were compared, and how many of them are given back, as fields of a result."""
+        return {
+            "n_entries": len(self.misfits),
+            "n_fitting": int(np.count_nonzero(self.misfits <= CERTIFIED)),
+        }
+
     def worst(
         self, count: int = 10, *, noise: NDArray | None = None, first: NDArray | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

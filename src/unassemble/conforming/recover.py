@@ -78,9 +78,13 @@ def _ambiguous(one: PlanarMesh, other: PlanarMesh) -> PlanarMesh:
     differ = [
         tuple(mine[key] for key in sorted(mine, key=sorted) if key not in theirs) for mine, theirs in (rows, rows[::-1])
     ]
-    reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
     other_cells = (Alternative(differ[0], differ[1]),)
-    return replace(one, verdict=one.verdict.beside(Reason(reason)), alternatives=other_cells)
+    return replace(one, verdict=one.verdict.beside(_OTHER_SIDES), alternatives=other_cells)
+
+
+_OTHER_SIDES = Reason(
+    "another mesh has the matrix as well, which does not tell which sides the cells of this mesh have"
+)
 
 
 def shown_cells(

@@ -14,9 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..certificate import Terms, certify_body, certify_mesh
 from ..elements import KINDS
 from ..errors import GeometryError, InputError, MatrixError, RecoveryError
-from ..matrix import as_csr, is_file, read_matrix
+from ..matrix import as_csr, check_matrix, is_file, read_matrix
 from ..matrix.digits import Digits
 from ..recovery import Body, PlanarMesh, Recovery
 from ..tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
@@ -24,14 +25,21 @@ from .cells import mass_matrix, weights_at
 
 
 def weighed(
-    recover: Callable[[Any], Recovery], stiffness: Any, masses: Any, anchors: Sequence[tuple[Any, ...]]
+    recover: Callable[[Any], Recovery],
+    stiffness: Any,
+    masses: Any,
+    anchors: Sequence[tuple[Any, ...]],
+    tensor: tuple[float, float, float] | None = None,
 ) -> Recovery:
     """The mesh of a stiffness matrix, by `recover`, with its density, or in the size in which the density is 1.
 
     The mass matrix is consistent, or lumped: each diagonal entry the sum of a row of the consistent one. Of anchors two
-    and more tell the size; one stays where it is. InputError if the matrices differ in size, MatrixError if one is no
-    square matrix of finite numbers, GeometryError if this is not the mass matrix of the mesh with one density, or
-    masses of such meshes are not read, RecoveryError as of `recover`.
+    and more tell the size; one stays where it is. `tensor`: (kxx, kxy, kyy) of the stiffness matrix. A mesh that is put
+    in another size is held against the stiffness matrix again.
+
+    InputError if the matrices differ in size, MatrixError if one is no square matrix of finite numbers, GeometryError
+    if this is not the mass matrix of the mesh with one density, masses of such meshes are not read, or the mesh in its
+    size is too far from the origin for its digits, RecoveryError as of `recover`.
     """
     A, given = as_csr(stiffness), read_matrix(masses) if is_file(masses) else masses
     try:
@@ -68,21 +76,30 @@ def weighed(
             "mesh of the stiffness matrix alone is certified"
         )
     factors = np.array([np.median(M.diagonal()[rows] / unit[rows]) for rows in own])
-    sized = len(anchors) > 1
+    sized, also = len(anchors) > 1, ""
     if not sized:
         centre = np.array(anchors[0][1:] if anchors else [0.0] * found.dim)[: found.dim]
-        found = _enlarged(found, factors ** (1 / found.dim), centre)
+        first, found = found, _enlarged(found, factors ** (1 / found.dim), centre)
+        before, after = (_stiffness_error(A, first, mesh, tensor) for mesh in (first, found))
+        if not after <= (CERTIFIED if before <= CERTIFIED else 2 * before):  # of few digits both have errors
+            raise _too_far(found)
+        if before <= CERTIFIED:
+            found = replace(found, backward_error=max(found.backward_error, after))
+        also = f", and in this size the stiffness matrix to {after:.1e}" if after else ""
     density = float(factors[0]) if sized else 1.0
     misfit = _misfit(density * _assembled(found, lumped), M, whole)
     off = found.position_error if isinstance(found, Body) else None  # a diameter is no longer than all edges
     allowed = CERTIFIED if found.backward_error <= CERTIFIED else max(ALIKE, (off or 0.0) * found.n_points)
     if not misfit <= allowed:
+        if _digits_lost(found):
+            raise _too_far(found)
         raise GeometryError(
             f"`mass` is not the mass matrix of this mesh with one density: entries differ by up to {misfit:.1e} of the "
             "diagonals of their rows. The mesh of the stiffness matrix alone is certified"
         )
     said = f"the mass matrix assembled on it again is the one given to {misfit:.1e}"
     said += "" if whole.all() else f", in the {whole.mean():.0%} of its rows all cells of which are determined"
+    said += also
     notes = found.warnings
     if not sized:
         root = "sqrt(rho)" if found.dim == 2 else "the cube root of rho"
@@ -141,6 +158,46 @@ def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> f
     root = np.sqrt(M.diagonal())
     some = whole[over.row]
     return float((over.data[some] / (root[over.row] * root[over.col])[some]).max(initial=0.0))
+
+
+def _stiffness_error(
+    A: sp.csr_array, first: Recovery, mesh: Recovery, tensor: tuple[float, float, float] | None
+) -> float:
+    """The largest misfit of a mesh among the entries that it gave back in the size in which it was found, `first`.
+
+    Entries beside supports, or with terms of their own, are none of these. Zero where there are none.
+    """
+    if isinstance(mesh, PlanarMesh) and isinstance(first, PlanarMesh):
+        matrix = check_matrix(0.5 * (A + A.T))  # with noise both triangles may differ
+        terms = None if mesh.row_scaling is None else Terms(matrix.diagonal, scaling=mesh.row_scaling)
+        known, again = (certify_mesh(matrix, one, tensor, terms) for one in (first, mesh))
+        given_back = known.misfits <= max(CERTIFIED, first.backward_error)
+        return float(again.misfits[given_back].max(initial=0.0))
+    if isinstance(mesh, Body) and len(mesh.lame) and mesh.node_of_row is not None and mesh.direction_of_row is not None:
+        body = certify_body(A, mesh.node_of_row, mesh.direction_of_row, mesh.points, mesh.cells, mesh.lame)
+        return 0.0 if np.isnan(body.backward_error) else body.backward_error
+    return 0.0
+
+
+def _edge(found: Recovery) -> float:
+    """About the length of an edge."""
+    ends = np.concatenate([cells[:, :2] for cells in found.cells.values()])
+    return float(np.nanmean(np.linalg.norm(found.points[ends[:, 1]] - found.points[ends[:, 0]], axis=1)))
+
+
+def _digits_lost(found: Recovery) -> bool:
+    """Whether coordinates are rounded to more than what counts as given back, relative to edges."""
+    return bool(np.nanmax(np.abs(found.points)) * np.finfo(float).eps > CERTIFIED * _edge(found))
+
+
+def _too_far(found: Recovery) -> GeometryError:
+    """That coordinates have too few digits in the size that the mass matrix tells."""
+    place = ", ".join(f"{x:.6g}" for x in np.nanmean(found.points, axis=0))
+    return GeometryError(
+        f"in the size that `mass` tells, edges are about {_edge(found):.1e} long, and coordinates have too few digits "
+        f"that far from the origin: subtract a point near ({place}) from `anchors`. The mesh of the stiffness matrix "
+        "alone is certified"
+    )
 
 
 def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Recovery:

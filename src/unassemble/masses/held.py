@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certificate import Certificate, Findings, Terms, Verdict, certify_mesh
+from ..certificate import Certificate, Findings, Terms, Unique, Verdict, certify_mesh
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..recovery import Examined, Placed, PlanarMesh, finish
 from ..tolerances import CERTIFIED, SIGMAS
-from ..words import Reason
+from ..words import Reason, count_of
 
 Plain = Callable[..., PlanarMesh]
 
@@ -59,15 +59,12 @@ class RowSums:
         def examine(_: PlanarMesh, whole: Certificate) -> Examined:
             error, known = whole.backward_error, found.verdict
             fits = f"{operator} re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-            return Examined(
-                Findings(
-                    fits=(fits,),
-                    error=error,
-                    objections=tuple(_objections(whole, fits, known)),
-                    another=Reason(fits, *known.reasons, advice=known.advice) if known.status == "ambiguous" else None,
-                    unique="searched" if unproved else known.unique,
-                )
-            )
+            another = None
+            if known.status == "ambiguous":  # the first reason is that of the other mesh
+                another = Reason(known.reasons[0], fits, advice=known.advice)
+            objections = tuple(_objections(whole, fits, known))
+            unique: Unique = "searched" if unproved else known.unique
+            return Examined(Findings((fits,), error, objections, another, unique), fields=whole.counts())
 
         return finish(
             self.clock,
@@ -80,8 +77,13 @@ class RowSums:
 
 
 def _objections(whole: Certificate, fits: str, known: Verdict) -> Iterator[Reason]:
-    """What speaks against a mesh as that of the whole matrix; `known` is what it is worth as that of the Laplacian."""
-    if not whole.backward_error <= CERTIFIED or len(whole.flipped):
+    """All that speaks against a mesh as that of the whole matrix.
+
+    `fits` says how well it gives this back; `known` is what it is worth as the mesh of the Laplacian alone, whose
+    objections it keeps.
+    """
+    if not whole.backward_error <= CERTIFIED:
         yield Reason(f"{fits} only", advice=known.advice)
-    elif known.objections:
-        yield Reason(fits, *known.reasons, advice=known.advice)
+    yield from known.objections
+    if len(whole.flipped) and not known.objections:
+        yield Reason(f"{count_of(len(whole.flipped), 'cell is', 'cells are')} flat, not convex or turned over")

@@ -7,6 +7,7 @@ import numpy as np
 from ..recovery import PlanarMesh, Surface
 from ..tolerances import CERTIFIED
 from ..words import Reason
+from .verdict import VARYING
 
 
 def could_be_planar(surface: Surface) -> bool:
@@ -58,6 +59,8 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
     if not (whole and could_be_planar(surface) and planar.n_components == surface.n_components):
         return surface
     (ax, ay), (bx, by), (cx, cy) = planar.points[surface.triangles].transpose(1, 2, 0)
+    # That it is flat shows that the coefficient is constant.
+    notes = [note for note in (*surface.warnings, *planar.warnings) if note != VARYING]
     turned = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0
     return replace(
         surface,
@@ -65,7 +68,8 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
         triangles=np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles),
         verdict=planar.verdict.explained("the surface is flat", *planar.verdict.reasons),
         backward_error=max(planar.backward_error, surface.backward_error),
-        warnings=planar.warnings,
+        warnings=tuple(dict.fromkeys(notes)),
+        reaction=planar.reaction,
         realisation={"misfit": 0.0, "largest": 0.0, "misfits": []},
     )
 

@@ -82,7 +82,9 @@ class Recovery:
     #: (k,) their misfit, as in `backward_error`.
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     suspects: NDArray[np.int64] = field(default_factory=none_of(2))  #: (k, 2) those that stand out from all others.
-    n_entries: int = 0  #: Entries above the diagonal, where all were compared.
+    #: Entries above the diagonal, where all were compared; those on it too where it was compared, with a mass term, a
+    #: scaling or terms on the boundary.
+    n_entries: int = 0
     n_fitting: int = 0  #: Those that the mesh gives back to 1e-9 of their row's largest.
     node_of_row: NDArray[np.int64] | None = None  #: (N,) node of each matrix row, if it is vector-valued.
     direction_of_row: NDArray[np.int64] | None = None  #: (N,) and its direction.

@@ -57,11 +57,7 @@ class PlanarComparison:
 
     def fields(self) -> dict[str, Any]:
         """What every planar mesh says of it."""
-        return {
-            "chi_square": self.figures or None,
-            "n_entries": len(self.certificate.misfits),
-            "n_fitting": int(np.count_nonzero(self.certificate.misfits <= CERTIFIED)),
-        }
+        return {"chi_square": self.figures or None, **self.certificate.counts()}
 
     @property
     def drowned(self) -> bool:

@@ -35,7 +35,7 @@ class Placement:
     @property
     def coefficients(self) -> tuple[float, float, float] | None:
         """(kxx, kxy, kyy) of the tensor, as the certificate takes them; None where there is none."""
-        return (self.tensor.kxx, self.tensor.kxy, self.tensor.kyy) if self.tensor else None
+        return self.tensor.coefficients if self.tensor else None
 
     @property
     def stretch(self) -> float:
