@@ -128,3 +128,17 @@ def test_rows_that_are_not_explained_are_named():
     found = recover(tied.matrix)
     assert found.status == "uncertified"
     assert "in row" in found.reason
+
+
+@pytest.mark.parametrize("change", [1e-6, 0.01, 0.5])
+def test_a_joint_holds_no_more_than_its_bars_and_springs(change):
+    """An entry between the rows of one joint is not given back by any bars, nor by a support."""
+    given = truss(3, 30).permuted(1)
+    assert recover(given.matrix).certified
+    damaged = sp.lil_array(given.matrix)
+    damaged[12, 13] = damaged[13, 12] = damaged[12, 13] + change * np.abs(given.matrix[[12]]).max()
+    matrix, rows = sp.csr_array(damaged), np.arange(90)
+    check = check_bars(matrix, rows // 3, rows % 3, given.points, allowed=1e-9)
+    assert check.backward_error > 1e-2 * change
+    assert set(check.unexplained.tolist()) <= {12, 13, 14}
+    assert not recover(matrix).certified

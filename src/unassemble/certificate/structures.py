@@ -84,9 +84,10 @@ def check_structure(
         misfit = _members(matrix, node_of_row, direction_of_row, x, displacements, rotations, members)
         counts |= _only_members(matrix, node_of_row, members) & ~others
     said = np.where(forces.due & ~(wrong & ground) & ~others[:, None], relative, 0.0).max(initial=0.0)
-    error = max(float(said), float(misfit.max(initial=0.0))) if counts.any() else float("inf")
-    touched = np.asarray(abs(matrix[np.flatnonzero(counts)]).sum(axis=0)).ravel() > 0
-    return StructureCheck(error, counts, touched, unexplained)
+    error = max(float(said), float(misfit.max(initial=0.0)))
+    if not counts.any() and error <= allowed:  # nothing was compared that would have shown an error
+        error = float("inf")
+    return StructureCheck(error, counts, _touched(matrix, counts), unexplained)
 
 
 def check_bars(
@@ -100,7 +101,8 @@ def check_bars(
     """Hold the matrix (N, N) of a truss against points (n, d), NaN where a node has none.
 
     The block of two nodes is that of a bar between them, - k e e^T, whose stiffness k is taken from the block itself.
-    What is left of an entry is relative to the largest entry that couples its node to another.
+    What is left of an entry is relative to the largest entry that couples its node to another. A node's own block is
+    the sum of its bars; what supports and springs to the ground add to it is positive semidefinite.
     """
     n, d = points.shape
     entry = matrix.tocoo()
@@ -109,15 +111,14 @@ def check_bars(
     a, b = direction_of_row[entry.row], direction_of_row[entry.col]
     off = (i != j) & known[i] & known[j] & (a >= 0) & (b >= 0)
     row, i, j, a, b, value = entry.row[off], i[off], j[off], a[off], b[off], entry.data[off]
+    counts = np.bincount(row, minlength=len(node_of_row)) > 0
     along = points[i] - points[j]
     length = np.linalg.norm(along, axis=1)
-    counts = known[node_of_row]
-    touched = np.asarray(abs(matrix[np.flatnonzero(counts)]).sum(axis=0)).ravel() > 0
-    if (length == 0).any():  # a bar without length has no direction
-        return StructureCheck(float("inf"), counts, touched, np.unique(row[length == 0]))
-    e = along / length[:, None] if d else along
+    if not len(row) or (length == 0).any():  # a bar without length has no direction
+        return StructureCheck(float("inf"), counts, _touched(matrix, counts), np.unique(row[length == 0]))
+    e = along / length[:, None]
     bar = np.take_along_axis(e, a[:, None], axis=1)[:, 0] * np.take_along_axis(e, b[:, None], axis=1)[:, 0]
-    _, pair = np.unique(i * n + j, return_inverse=True)
+    _, first, pair = np.unique(i * n + j, return_index=True, return_inverse=True)
     weight = np.bincount(pair, bar * bar)
     force = np.bincount(pair, value * bar) / np.where(weight > 0, weight, 1.0)
     size = np.zeros(n)
@@ -125,9 +126,41 @@ def check_bars(
     left = np.abs(value - force[pair] * bar) / np.where(size[i] > 0, size[i], 1.0)
     worst = np.zeros(len(node_of_row))
     np.maximum.at(worst, row, left)
+    own, asked = _own_blocks(matrix, node_of_row, direction_of_row, known, d)
+    np.add.at(own, i[first], force[:, None, None] * e[first][:, :, None] * e[first][:, None, :])
+    own /= np.where(size > 0, size, 1.0)[:, None, None]
+    sign = np.sign(matrix.diagonal().sum())
+    least = np.linalg.eigvalsh(sign * (own + own.transpose(0, 2, 1)) / 2)[:, 0]
+    below = np.where(asked & (size > 0), np.maximum(-least, 0.0), 0.0)
+    worst = np.maximum(worst, below[node_of_row] * counts)
     order = np.argsort(-worst, kind="stable")
     unexplained = order[: np.count_nonzero(worst > allowed)]
-    return StructureCheck(float(worst.max(initial=0.0)), counts, touched, unexplained)
+    return StructureCheck(float(worst.max()), counts, _touched(matrix, counts), unexplained)
+
+
+def _own_blocks(
+    matrix: sp.csr_array,
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+    known: NDArray[np.bool_],
+    d: int,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(n, d, d) blocks of nodes with themselves, and (n,) nodes that have all rows, and neighbours with positions."""
+    n, entry = len(known), matrix.tocoo()
+    i, j = node_of_row[entry.row], node_of_row[entry.col]
+    a, b = direction_of_row[entry.row], direction_of_row[entry.col]
+    named = (a >= 0) & (b >= 0)
+    same = named & (i == j)
+    blocks = np.zeros((n, d, d))
+    np.add.at(blocks, (i[same], a[same], b[same]), entry.data[same])
+    rows = np.bincount(node_of_row[direction_of_row >= 0], minlength=n)
+    lacking = np.bincount(i, (~known[j] | ~named) & (entry.data != 0), n)
+    return blocks, known & (rows == d) & (lacking == 0)
+
+
+def _touched(matrix: sp.csr_array, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) unknowns in these rows, (N,)."""
+    return np.asarray(abs(matrix[np.flatnonzero(rows)]).sum(axis=0)).ravel() > 0
 
 
 def _determined(points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -138,10 +138,12 @@ class Known:
     def objections(self, misfit: float, rounding: Rounding | None, said: str) -> Iterator[Reason]:
         """Why positions are not certified that leave some largest misfit, which is `said`."""
         allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
+        far = f"positions may be off by {self.error:.0e} of the size"
         if not (misfit <= allowed and self.explained):
             yield Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
+            said = ""
         if not self.error <= needed:
-            yield Reason(f"{said}, and positions may be off by {self.error:.0e} of the size")
+            yield Reason(f"{said}, and {far}" if said else far)
 
     def within(self, rounding: Rounding | None) -> str:
         """How far positions are known, in words; empty for entries of full precision."""

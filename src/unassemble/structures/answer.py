@@ -67,7 +67,7 @@ def _most_in(check: StructureCheck) -> str:
     worst = check.unexplained[:3]
     if not len(worst):
         return ""
-    more = ", ..." if len(check.unexplained) > len(worst) else ""
+    more = " and others" if len(check.unexplained) > len(worst) else ""
     return f", most in {'row' if len(worst) == 1 else 'rows'} {words_of(worst.tolist())}{more}"
 
 
