@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .formats import MeshFormat
-from .recovery import PlanarMesh, Recovery
+from .recovery import Recovery
 from .structures.layouts import layout_named
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
 
 def cells_of(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
     """Cells by kind, polygons divided; where the elements of a vector-valued matrix are not known, its nodes."""
-    if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
+    if recovery.n_polygons:
         return {"triangle": recovery.divided()[0]}
     if recovery.n_cells or not recovery.vector_valued:
         return recovery.cells or {"triangle": recovery.triangles}
@@ -61,9 +61,8 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
         "backward_error": float(recovery.backward_error),
     }
     data |= {name: np.full(recovery.n_points, value) for name, value in worth.items()}
-    if isinstance(recovery, PlanarMesh) and recovery.region is not None:
-        return data  # each cell has a factor, points have none
-    return data | {"scale": np.append(recovery.scale, np.nan)[recovery.component]}
+    scale = recovery.scale_at_points()
+    return data if scale is None else data | {"scale": scale}
 
 
 def mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
@@ -76,11 +75,8 @@ def mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     points = np.zeros((recovery.n_points, max(mesh_format.dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
     blocks = list(cells_of(recovery).items())
-    if mesh_format.polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        corners, start = recovery.polygons_data, recovery.polygons_offsets[:-1]
-        size = np.diff(recovery.polygons_offsets)
-        same = [("polygon", corners[start[size == k, None] + np.arange(k)]) for k in np.unique(size)]
-        blocks = [*recovery.cells.items(), *same]
+    if mesh_format.polygons and recovery.n_polygons:
+        blocks = [*recovery.cells.items(), *(("polygon", cells) for cells in recovery.polygons_by_size())]
     mesh = meshio.Mesh(points, blocks, point_data=data)
     if not mesh_format.keeps_rows:  # points of no triangle have no place, and NaN would spoil bounding boxes
         mesh.points[np.isnan(mesh.points)] = 0

@@ -46,7 +46,7 @@ def as_html(recovery: Recovery) -> str:
     import io
 
     rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in table(recovery))
-    if isinstance(recovery, PlanarMesh) and recovery.shapeless:
+    if not recovery.drawable:
         return f"<table>{rows}</table>"
     stream = io.BytesIO()
     plot(recovery).savefig(stream, format="png", dpi=72)

@@ -1,5 +1,7 @@
 """Surfaces of which rows were taken out: one alone in a place can be put back, and nothing is certified without c."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyamg
 import pytest
@@ -7,6 +9,7 @@ from surfaces import double_torus, largest_error, moebius, sheet, sphere, surfac
 
 from meshes import triangle_set
 from unassemble import RecoveryError, recover
+from unassemble.metric.verdict import Found
 
 
 def test_the_knot_of_pyamg():
@@ -38,6 +41,26 @@ def test_vertices_apart_from_each_other(mesh):
     assert found.loops.tolist() == [2]
     assert largest_error(found, points) <= 1e-11
     assert recover(matrix, operator="surface", scale=-0.7).certified
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_lengths_are_compared_as_they_are_written(spoiled, monkeypatch):
+    """Those of the surface without the vertices that were put back: where they are spoiled on the way that shows."""
+    known = surface(*torus(), c=-0.7, seed=3)
+    matrix, _ = without(known, [0])
+    left_over = Found.without_last
+
+    def spoil(found, gone):
+        left = left_over(found, gone)
+        squared = left.squared.copy()
+        squared[7] *= 1 + 1e-4 * spoiled
+        return replace(left, squared=squared)
+
+    monkeypatch.setattr(Found, "without_last", spoil)
+    found = recover(matrix, operator="surface", scale=-0.7)
+    assert found.certified != spoiled
+    if not spoiled:
+        assert found.backward_error < 1e-12
 
 
 @pytest.mark.slow

@@ -85,6 +85,7 @@ def _recovered(
             for scale, (rows, opposite) in zip(best.scale, best.mesh.pieces(), strict=True):
                 if np.isfinite(scale):
                     deviations[rows] = options.noise / abs(scale) * length_deviations(best.squared[rows], opposite)
+    whole = best
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
@@ -99,8 +100,10 @@ def _recovered(
         notes.append(VARYING)
 
     def compare(surface: Surface) -> Certificate:
-        """Of the surface as it is written; with vertices that were put back of that which has them."""
-        return best.certificate.entries if back else _compared(matrix, surface).entries
+        """Of the surface as it is written, with the vertices that were put back where there are any."""
+        if back:
+            return _compared_with_back(matrix, whole, surface, best.mesh.piece_of_edge).entries
+        return _compared(matrix, surface).entries
 
     return finish(
         clock,
@@ -115,6 +118,23 @@ def _compared(matrix: OperatorMatrix, surface: Surface) -> MetricCertificate:
     factor = surface.scale[surface.component[surface.triangles].max(axis=1)]  # hinges have the lowest
     lengths = surface.edge_lengths
     return certify_metric(surface.edges, matrix.entries, matrix.diagonal, lengths, surface.triangles, factor)
+
+
+def _compared_with_back(
+    matrix: OperatorMatrix, whole: Found, surface: Surface, piece: NDArray[np.int64]
+) -> MetricCertificate:
+    """A surface as it is written, and beside it the vertices that were put back, against the matrix with their rows.
+
+    `piece`, (e,), is that of each edge of the surface. What is written has a unit of length in each of them, in which
+    the mean is one. The lengths at vertices that were put back are nowhere written: those found with the `whole` are
+    taken, and tell that unit.
+    """
+    mesh, lengths = whole.mesh, np.sqrt(whole.squared)
+    kept = (mesh.edges < surface.n_points).all(axis=1)
+    unit = np.bincount(piece, lengths[kept]) / np.bincount(piece, surface.edge_lengths)
+    lengths[kept] = surface.edge_lengths * unit[piece]
+    factor = whole.scale[mesh.piece]
+    return certify_metric(mesh.edges, matrix.entries, matrix.diagonal, lengths, mesh.triangles, factor)
 
 
 def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: ScalarOptions) -> Found:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..files import whole_file
-from ..recovery import PlanarMesh
+from ..recovery import Recovery
 from ..topology.numbering import connected
 from . import style
 
@@ -64,7 +64,7 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
         figure.legend(handles=handles, loc="lower left", frameon=False, fontsize=8.5, **more, **gaps)
 
 
-def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
+def laid_out(mesh: Recovery) -> NDArray[np.float64]:
     """(n, 2) points of a mesh for the eye; what hangs together, by edges or in hinges, stays together."""
     triangles = mesh.divided()[0]
     label = connected(mesh.n_points, triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())[1]

@@ -12,12 +12,12 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from ..recovery import PlanarMesh
+from ..recovery import Recovery
 from ..words import count_of
 from . import style
 
 
-def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> list[Line2D]:
+def draw_mesh(ax: Axes, mesh: Recovery, points: NDArray, outer: NDArray) -> list[Line2D]:
     """Draw a mesh with its points at `points` (n, 2), on an axes with its limits set; handles for a legend come back.
 
     `outer`, (loops,) bool: which loops bound a piece from outside, see :func:`outer_loops`.
@@ -83,7 +83,7 @@ def extent(points: NDArray, used: NDArray[np.bool_]) -> NDArray[np.float64]:
     return np.stack([used.min(axis=0), used.max(axis=0)]) if len(used) else np.array([[0.0, 0.0], [1.0, 1.0]])
 
 
-def outer_loops(mesh: PlanarMesh) -> NDArray[np.bool_]:
+def outer_loops(mesh: Recovery) -> NDArray[np.bool_]:
     """(loops,) whether a boundary loop runs counter-clockwise, as outer ones do; around holes they run clockwise."""
     boundary, offsets = mesh.boundary, mesh.boundary_offsets
     loop = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))

@@ -11,7 +11,7 @@ from ..clock import Clock
 from ..errors import FormatError
 from ..files import check_plot
 from ..metric import realised
-from ..recovery import PlanarMesh, Recovery, Surface
+from ..recovery import Recovery, Surface
 from ..summary import counted_cells
 from ..words import count_of
 from . import style
@@ -38,7 +38,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
         recovery = realised(recovery, Clock(), starts=1)  # edge lengths cannot be drawn
     if recovery.shapeless:
         raise FormatError(f"{recovery.shapeless}, and there is no shape to draw")
-    if isinstance(recovery, PlanarMesh) and recovery.look.outlined:
+    if recovery.look.outlined:
         points = laid_out(recovery)
         figure, drawn = panel(extent(points, recovery.component >= 0), ax)
         handles: list[Artist] = [*draw_mesh(drawn, recovery, points, outer_loops(recovery))]

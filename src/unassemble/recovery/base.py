@@ -157,6 +157,21 @@ class Recovery:
         """Cells of each kind that occurs, all their nodes, by meshio's names; polygons are not among them."""
         return occurring(triangle=self.triangles)
 
+    def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles (m, 3), with cells that the matrix leaves undivided in fans.
+
+        And (m, 3) bool, false for sides, from each corner to the next, that are diagonals of such cells.
+        """
+        return self.triangles, np.ones(self.triangles.shape, dtype=bool)
+
+    def polygons_by_size(self) -> list[NDArray[np.int64]]:
+        """Cells that the matrix leaves undivided, (m, k) for each number k of vertices that occurs."""
+        return []
+
+    def scale_at_points(self) -> NDArray[np.float64] | None:
+        """(n,) the factor of the piece of each point; None where factors belong to cells."""
+        return np.append(self.scale, np.nan)[self.component]
+
     @property
     def element(self) -> str | None:
         """``P1`` to ``P3``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
@@ -168,6 +183,11 @@ class Recovery:
     def shapeless(self) -> str:
         """Why there are no points to write or to draw; empty where there are."""
         return ""
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there is a picture of it."""
+        return not self.shapeless
 
     @property
     def instead(self) -> str:

@@ -111,11 +111,17 @@ class PlanarMesh(Recovery):
         columns = zip("xyz", self.standard_deviations.T, strict=False)
         return {f"standard_deviation_{name}": np.ascontiguousarray(column) for name, column in columns}
 
-    def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Triangles (m, 3), with the polygons in fans.
+    def polygons_by_size(self) -> list[NDArray[np.int64]]:
+        """Cells that the matrix leaves undivided, (m, k) for each number k of vertices that occurs."""
+        start, size = self.polygons_offsets[:-1], np.diff(self.polygons_offsets)
+        return [self.polygons_data[start[size == k, None] + np.arange(k)] for k in np.unique(size)]
 
-        And (m, 3) bool, false for sides, from each corner to the next, that are diagonals of polygons.
-        """
+    def scale_at_points(self) -> NDArray[np.float64] | None:
+        """(n,) the factor of the piece of each point; None where each cell has that of its region."""
+        return super().scale_at_points() if self.region is None else None
+
+    def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles (m, 3), with the polygons in fans, and which of their sides, (m, 3), are no diagonals of these."""
         fans, _, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
         return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
 
@@ -199,6 +205,11 @@ class Surface(Recovery):
         if np.isfinite(self.points).any():
             return ""
         return "the matrix of a surface tells edge lengths only"
+
+    @property
+    def drawable(self) -> bool:
+        """Yes: in coordinates that come near its lengths where it has no others."""
+        return True
 
     @property
     def instead(self) -> str:
