@@ -13,7 +13,7 @@ from meshes import delaunay, largest_error, random_mesh, triangle_set
 from unassemble import FormatError, MatrixError, RecoveryError, recover
 from unassemble.certificate import Terms
 from unassemble.cli import main
-from unassemble.masses.held import RowSums
+from unassemble.masses import RowSums
 from unassemble.matrix import check_matrix
 from unassemble.words import Reason
 

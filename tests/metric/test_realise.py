@@ -14,8 +14,7 @@ from surfaces import largest_error, moebius, sheet, surface
 from meshes import random_mesh, specimen, triangle_set
 from unassemble import FormatError, recover
 from unassemble.cli import main
-from unassemble.metric import flattened
-from unassemble.metric.verdict import VARYING
+from unassemble.metric import VARYING, flattened
 
 
 def lengths_of(found):

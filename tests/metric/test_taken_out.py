@@ -9,7 +9,7 @@ from surfaces import double_torus, largest_error, moebius, sheet, sphere, surfac
 
 from meshes import triangle_set
 from unassemble import RecoveryError, recover
-from unassemble.metric.verdict import Found
+from unassemble.metric import Found
 
 
 def test_the_knot_of_pyamg():

@@ -5,6 +5,7 @@ that these do not tell; `held` judges what was found by the whole matrix.
 """
 
 from .beside import weighed as weighed
+from .held import RowSums as RowSums
 from .recover import (
     recover_elements_with_terms as recover_elements_with_terms,
     recover_with_terms as recover_with_terms,

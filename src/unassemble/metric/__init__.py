@@ -10,4 +10,4 @@ from .heron import angles as angles, areas_cotangents as areas_cotangents, heron
 from .program import solve_metric as solve_metric
 from .realise import realised as realised
 from .recover import recover_surface as recover_surface
-from .verdict import length_deviations as length_deviations
+from .verdict import VARYING as VARYING, Found as Found, length_deviations as length_deviations
