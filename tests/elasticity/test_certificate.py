@@ -220,3 +220,19 @@ def test_a_clamped_body_says_how_many_rows_are_given_back():
     assert found.certified
     assert f"give back {len(matrix.indptr) - 1 - beside} of the {len(matrix.indptr) - 1} rows" in found.reason
     assert any(f"{beside} rows are not compared" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("kind", "digits"), [("tri-p1", 8), ("tri-p1", 12), ("tet-p1", 8)])
+def test_elements_that_few_digits_hide_are_spoken_of(kind, digits):
+    """A weak element looks like a hole there."""
+    mesh = box(kind, (8, 8) if kind == "tri-p1" else (4, 4, 4), perturb=0.2)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    near = np.hypot(*(middle[:2] - np.ptp(mesh.p, axis=1)[:2, None] / 2)) < 0.15
+    assert near.any()
+    for contrast, hidden in ((1.0, False), (1e-3, False), (1e-9, True)):
+        modulus = np.where(near, contrast, 1.0)[:, None]
+        case = permuted_nodes(stiffness(kind, mesh, lam=1.5 * modulus, mu=modulus), seed=1)
+        found = recover(written(case.matrix, digits))
+        assert found.certified
+        assert any("rounding of the entries hides" in warning for warning in found.warnings) == hidden
+        assert found.n_cells == mesh.nelements or hidden

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..budget import AT_ONCE, SAMPLE
@@ -255,7 +256,9 @@ def _surrounded(
     """(N,) rows of nodes that have all d rows and a position, and so have all that these couple to.
 
     Their entries add up to zero in each direction. Those of rows with a support on the diagonal do not add up to it in
-    their own; where the diagonal is as large as a penalty that is why, and no neighbour need be gone.
+    their own; where the diagonal is as large as a penalty that is why, and no neighbour need be gone. Yet one may be:
+    in regular meshes what is lost adds up to zero in the other directions. It does not in a row of the node without a
+    penalty, nor at the ends of a line or patch of nodes that have penalties in all directions.
     """
     order, n = len(node_of_row), len(known)
     named = (direction_of_row >= 0) & (_row_sizes(matrix, node_of_row) > 0)
@@ -268,10 +271,20 @@ def _surrounded(
     size = np.bincount(entry.row[apart], np.abs(entry.data[apart]), order)
     sums[np.arange(order), np.maximum(direction_of_row, 0)] += matrix.diagonal()
     zero = np.abs(sums) <= CANCELLED * size[:, None]
-    zero[np.arange(order), np.maximum(direction_of_row, 0)] |= np.abs(matrix.diagonal()) > PENALTY * size
+    penalty = np.abs(matrix.diagonal()) > PENALTY * size
+    zero[np.arange(order), np.maximum(direction_of_row, 0)] |= penalty
     good = zero.all(axis=1) & (size > 0) & (direction_of_row >= 0)
     good &= np.bincount(entry.row, ~whole[node_of_row[entry.col]] & (entry.data != 0), order) == 0
     all_good = np.bincount(node_of_row, good, minlength=n) == d
+    alone = all_good & (np.bincount(node_of_row, good & ~penalty, minlength=n) == 0)
+    if alone.any():
+        live = entry.data != 0
+        near = (np.ones(live.sum()), (node_of_row[entry.row[live]], node_of_row[entry.col[live]]))
+        graph = sp.csr_array(near, shape=(n, n))
+        between = sp.diags_array(alone.astype(float))
+        _, patch = connected_components(sp.csr_array(between @ graph @ between), directed=False)
+        beside = np.bincount(patch, graph @ (~all_good).astype(float) > 0) > 0
+        all_good &= ~(alone & beside[patch])
     return np.asarray(all_good[node_of_row] & good)
 
 

@@ -20,9 +20,9 @@ from ..tolerances import ALIKE, CERTIFIED, PENALTY, PLACED, SIGMAS
 from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import RecognisedCells, recognise_cells
-from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
+from .nullspace.residuals import residuals
 from .positions import solve
 from .verdict import (
     NOTHING_CHECKED,
@@ -33,6 +33,7 @@ from .verdict import (
     contrast,
     examined,
     given_back,
+    hidden_by_digits,
     hidden_elements,
     no_positions,
 )
@@ -110,7 +111,7 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
         objections.append(NOTHING_CHECKED)
     if any(map(_flat, bodies)):
         objections.append(Reason("the points lie in one line or plane, and no solid body does"))
-    if found.hidden > 0:
+    if found.hidden > 0 and not rounding:
         objections.append(hidden_elements(found.hidden))
     if alone and cells and contrast(nodal) > 1 / ALIKE:
         objections.append(WEAK_AND_UNKNOWN)
@@ -119,6 +120,8 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
     guessed = guessed_directions(numbering, loose)
     masks, asked = (withheld, hanging, lone), shown if cells else None
     said = (*solution.warnings, *notes(nodal, solution, asked, loose, masks, int(guessed.sum())))
+    if found.hidden > 0 and rounding:  # holes look the same
+        said = (*said, hidden_by_digits(found.hidden))
     rows = replace(numbering, direction_of_row=np.where(guessed, -1, numbering.direction_of_row))
     free = "the sign of the scale is free: with a mesh its point reflection fits the matrix as well"
     another = None

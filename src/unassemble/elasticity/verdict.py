@@ -47,6 +47,12 @@ def hidden_elements(count: int) -> Reason:
     return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
+def hidden_by_digits(count: int) -> str:
+    """That few digits hide weak elements, where there may be none."""
+    weak = "so weak that rounding of the entries hides them, or there are holes in their places"
+    return f"{count_of(count, 'element')} may be missing, or of another material than is said: {weak}"
+
+
 def against_body(
     certificate: BodyCertificate, foreign: NDArray[np.int64], allowed: NDArray[np.float64]
 ) -> Iterator[Reason]:
