@@ -7,6 +7,7 @@ from assembled import ELEMENTS, box, heterogeneous, on_plane, permuted_nodes, st
 
 from unassemble import recover
 from unassemble.certificate import certify_body, certify_positions
+from unassemble.elasticity.verdict import against_body
 
 COUNTS = {"tri": (5, 6), "qua": (5, 6), "tet": (3, 4, 3), "hex": (3, 4, 3)}
 
@@ -141,7 +142,6 @@ def test_few_digits_hide_no_wrong_entry(digits):
     found = recover(right)
     assert found.certified
     assert not any("may be missing" in warning for warning in found.warnings)
-    assert "in all rows but" not in found.reason
     node = found.node_of_row
     entry = sp.csr_array(case.matrix).tocoo()
     near = (node[entry.row] < node[entry.col]) & (np.abs(entry.data) > 0.1)
@@ -149,4 +149,90 @@ def test_few_digits_hide_no_wrong_entry(digits):
         wrong = sp.lil_array(case.matrix)
         wrong[i, j] = wrong[j, i] = wrong[i, j] + 0.3
         changed = sp.csr_array(wrong)
+        refused = recover(changed if digits is None else written(changed, digits))
+        assert not refused.certified
+        assert set(refused.worst_entries[0]) == {i, j}
+        assert refused.backward_error > 0.05
+        assert f"rows {min(i, j)} and {max(i, j)} that no other element" in refused.reason
+
+
+@pytest.mark.parametrize("digits", [None, 12])
+@pytest.mark.parametrize("penalty", [1e4, 1e12])
+@pytest.mark.parametrize("directions", [(0,), (0, 1)])
+def test_penalties_hide_no_wrong_entry_beside_them(directions, penalty, digits):
+    """No node is gone there, so that all entries of these rows are compared, but for the diagonals."""
+    case = body("quad-q1", lam=1.5)
+    held = np.flatnonzero(on_plane(case, 0))
+    matrix = sp.lil_array(case.matrix)
+    for row in (2 * held[:, None] + directions).ravel():
+        matrix[row, row] += penalty
+    right = sp.csr_array(matrix)
+    found = recover(right if digits is None else written(right, digits))
+    assert found.certified, found.reason
+    assert not any("may be missing" in warning for warning in found.warnings)
+    first, other = 2 * held[0], 2 * held[1:]
+    coupled = np.array([right[first, row] != 0 for row in other])
+    for row, value in ((other[coupled][0], -3 * right[first, other[coupled][0]]), (other[~coupled][0], 0.3)):
+        wrong = right.tolil()
+        wrong[first, row] = wrong[row, first] = value
+        changed = sp.csr_array(wrong)
         assert not recover(changed if digits is None else written(changed, digits)).certified
+
+
+def test_a_body_of_which_nothing_can_be_compared_is_not_certified():
+    case = body("quad-q1", lam=1.5)
+    found = recover(case.matrix)
+    nowhere = np.full_like(found.points, np.nan)
+    rows = found.node_of_row, found.direction_of_row
+    allowed = np.full(len(rows[0]), 1e-9)
+    unnamed = rows[0], np.full_like(rows[1], -1)
+    matrix = sp.csr_array(case.matrix)
+    for certificate in (
+        certify_positions(matrix, *rows, nowhere),
+        certify_body(matrix, *unnamed, found.points, found.cells, found.lame),
+    ):
+        assert np.isnan(certificate.backward_error)
+        foreign, _ = certificate.of_no_element(allowed)
+        assert len(list(against_body(certificate, foreign, allowed))) == 1
+
+
+def test_worst_entries_come_once_and_are_none_for_identities():
+    case = body("quad-q1", lam=1.5)
+    found = recover(case.matrix)
+    moved = found.points.copy()
+    moved[7] += 1e-3
+    pairs, misfits = on_the_result(found, case.matrix, points=moved).worst(20)
+    assert len(pairs) == 20
+    assert len(np.unique(np.sort(pairs, axis=1), axis=0)) == 20
+    assert (np.diff(misfits) <= 0).all()
+    rows = found.node_of_row, found.direction_of_row
+    certificate = certify_positions(sp.csr_array(case.matrix), *rows, moved)
+    assert certificate.backward_error > 1e-6
+    assert not len(certificate.worst(20)[0])
+
+
+def test_a_clamped_body_says_how_many_rows_are_given_back():
+    case = body("quad-q1", lam=1.5)
+    gone = np.repeat(on_plane(case, 0), 2)
+    matrix = sp.csr_array(case.matrix[~gone][:, ~gone])
+    beside = int(np.count_nonzero(np.abs(case.matrix[~gone][:, gone]).sum(axis=1)))
+    found = recover(matrix)
+    assert found.certified
+    assert f"give back {len(matrix.indptr) - 1 - beside} of the {len(matrix.indptr) - 1} rows" in found.reason
+    assert any(f"{beside} rows are not compared" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("kind", "digits"), [("tri-p1", 8), ("tri-p1", 12), ("tet-p1", 8)])
+def test_elements_that_few_digits_hide_are_spoken_of(kind, digits):
+    """A weak element looks like a hole there."""
+    mesh = box(kind, (8, 8) if kind == "tri-p1" else (4, 4, 4), perturb=0.2)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    near = np.hypot(*(middle[:2] - np.ptp(mesh.p, axis=1)[:2, None] / 2)) < 0.15
+    assert near.any()
+    for contrast, hidden in ((1.0, False), (1e-3, False), (1e-9, True)):
+        modulus = np.where(near, contrast, 1.0)[:, None]
+        case = permuted_nodes(stiffness(kind, mesh, lam=1.5 * modulus, mu=modulus), seed=1)
+        found = recover(written(case.matrix, digits))
+        assert found.certified
+        assert any("rounding of the entries hides" in warning for warning in found.warnings) == hidden
+        assert found.n_cells == mesh.nelements or hidden

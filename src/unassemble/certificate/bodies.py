@@ -1,8 +1,8 @@
 """Elastic bodies: the matrix re-assembled on the body as written, or rigid motions and identities asked of its points.
 
 Which entries a list of cells has to explain is read off the matrix: a node is surrounded if its rows annihilate the
-translations, and if all that they couple to has a position. All cells around such
-a node have to be there, and so every entry of its rows is that of the cells.
+translations, but for a penalty on the diagonal, and if all that they couple to has a position. All cells around such
+a node have to be there, and so every entry of its rows is that of the cells, but for that diagonal.
 """
 
 from collections.abc import Mapping
@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..budget import AT_ONCE, SAMPLE
-from ..tolerances import CANCELLED, CERTIFIED, ROUNDED
+from ..tolerances import CANCELLED, CERTIFIED, PENALTY, ROUNDED
 from .comparison import relative
 from .solids import Rule, rules_of, stiffness
 
@@ -34,17 +35,24 @@ class BodyCertificate:
     # what cells leave of the entries between nodes with positions, each over the sizes of its rows; None for identities
     remainder: sp.csr_array | None = None
 
-    def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The entries that fit worst, each once, worst first, and their misfits: those above the bound.
+    def worst(
+        self, count: int = 10, allowed: float | NDArray[np.float64] = CERTIFIED
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The entries that fit worst, each once, worst first, and their misfits: those above what is `allowed`.
 
-        Of identities there are none, since each belongs to a whole row.
+        That is a number, or one for each row, (N,). Of identities there are none, since each belongs to a whole row.
         """
         row, column = self.pairs.T
-        above = np.flatnonzero((self.misfits > CERTIFIED) & (row <= column) & (self.remainder is not None))
-        order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
+        above = (self.misfits > self.bounds(allowed)) & (row <= column) & (self.remainder is not None)
+        order = _largest(self.misfits, np.flatnonzero(above))[:count]
         return self.pairs[order], self.misfits[order]
 
-    def silent(self, allowed: float) -> NDArray[np.int64]:
+    def bounds(self, allowed: float | NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) of each comparison the larger of what is `allowed` in its two rows."""
+        by_row = np.broadcast_to(np.asarray(allowed, dtype=float), self.compared.shape)
+        return np.asarray(by_row[self.pairs].max(axis=1))
+
+    def silent(self, allowed: float | NDArray[np.float64]) -> NDArray[np.int64]:
         """Rows that were not compared and of which cells leave more than is `allowed`, as next to supports.
 
         Those of which they leave most come first.
@@ -52,17 +60,32 @@ class BodyCertificate:
         if self.remainder is None:
             return np.empty(0, np.int64)
         rest = np.asarray(abs(self.remainder).max(axis=1).todense()).ravel()
-        order = np.argsort(-rest, kind="stable")
-        return order[(rest[order] > allowed) & ~self.compared[order]]
+        return _largest(rest, np.flatnonzero((rest > allowed) & ~self.compared))
 
-    def could_be_elements(self, allowed: float) -> bool:
+    def could_be_elements(self, allowed: float | NDArray[np.float64]) -> bool:
         """Whether what cells leave may be the stiffness of other elements, of which supports took nodes away.
 
         The rows and columns that are left of an element's stiffness matrix are positive semidefinite, as is the matrix
         of a spring, and so is any sum of them. What a wrong entry leaves mostly is not. `allowed` is how far below zero
-        an eigenvalue may be, relative to the rows.
+        an eigenvalue may be, relative to the rows: a number, or one for each row, (N,).
         """
         return self.remainder is None or _semidefinite(self.remainder, allowed)
+
+    def of_no_element(self, allowed: float | NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Entries (k, 2) that cells leave and no other elements have, the largest first, and their sizes; or none.
+
+        In a positive semidefinite matrix no entry is larger than the root of the product of the two diagonal ones, and
+        these are not negative. Where all entries are so, and the matrix is indefinite yet, the largest are named.
+        """
+        if self.remainder is None or self.could_be_elements(allowed):
+            return np.empty((0, 2), np.int64), np.empty(0)
+        entry = self.remainder.tocoo()
+        own = np.maximum(self.remainder.diagonal() + allowed, 0.0)
+        apart = entry.row < entry.col
+        wrong = apart & (np.abs(entry.data) > np.sqrt(own[entry.row] * own[entry.col]))
+        wrong |= (entry.row == entry.col) & (own[entry.row] == 0)
+        order = _largest(np.abs(entry.data), np.flatnonzero(wrong if wrong.any() else apart))
+        return np.column_stack([entry.row, entry.col]).astype(np.int64)[order], np.abs(entry.data[order])
 
 
 def certify_body(
@@ -162,6 +185,11 @@ def certify_positions(
     )
 
 
+def _largest(value: NDArray[np.float64], some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The places in `some` in the order of their values, the largest first."""
+    return some[np.argsort(-value[some], kind="stable")]
+
+
 def _nothing(order: int) -> BodyCertificate:
     """The certificate of what nothing was compared with."""
     return BodyCertificate(
@@ -185,15 +213,16 @@ def _remainder(
     return sp.csr_array((sign * value[there], (rest.row[there], rest.col[there])), shape=rest.shape)
 
 
-def _semidefinite(matrix: sp.csr_array, allowed: float) -> bool:
-    """Whether no eigenvalue of a symmetric matrix is below minus what is allowed.
+def _semidefinite(matrix: sp.csr_array, allowed: float | NDArray[np.float64]) -> bool:
+    """Whether no eigenvalue of a symmetric matrix is below minus what is allowed, one number or one for each row.
 
     By Sylvester's law of inertia: the pivots of the matrix, with as much added to its diagonal, are positive.
     """
     rows = np.unique(matrix.tocoo().row)
     if not len(rows):
         return True
-    some = sp.csc_array(matrix[rows][:, rows] + allowed * sp.eye_array(len(rows)))
+    shift = np.broadcast_to(np.asarray(allowed, dtype=float), matrix.shape[:1])[rows]
+    some = sp.csc_array(matrix[rows][:, rows] + sp.diags_array(shift))
     if len(rows) <= SAMPLE // 4:
         return bool(np.linalg.eigvalsh(some.toarray())[0] > 0)
     try:
@@ -226,7 +255,10 @@ def _surrounded(
 ) -> NDArray[np.bool_]:
     """(N,) rows of nodes that have all d rows and a position, and so have all that these couple to.
 
-    Their entries add up to zero in each direction, as those of rows with a support on the diagonal do not.
+    Their entries add up to zero in each direction. Those of rows with a support on the diagonal do not add up to it in
+    their own; where the diagonal is as large as a penalty that is why, and no neighbour need be gone. Yet one may be:
+    in regular meshes what is lost adds up to zero in the other directions. It does not in a row of the node without a
+    penalty, nor at the ends of a line or patch of nodes that have penalties in all directions.
     """
     order, n = len(node_of_row), len(known)
     named = (direction_of_row >= 0) & (_row_sizes(matrix, node_of_row) > 0)
@@ -238,9 +270,21 @@ def _surrounded(
     apart = node_of_row[entry.row] != node_of_row[entry.col]
     size = np.bincount(entry.row[apart], np.abs(entry.data[apart]), order)
     sums[np.arange(order), np.maximum(direction_of_row, 0)] += matrix.diagonal()
-    good = (np.abs(sums) <= CANCELLED * size[:, None]).all(axis=1) & (size > 0) & (direction_of_row >= 0)
+    zero = np.abs(sums) <= CANCELLED * size[:, None]
+    penalty = np.abs(matrix.diagonal()) > PENALTY * size
+    zero[np.arange(order), np.maximum(direction_of_row, 0)] |= penalty
+    good = zero.all(axis=1) & (size > 0) & (direction_of_row >= 0)
     good &= np.bincount(entry.row, ~whole[node_of_row[entry.col]] & (entry.data != 0), order) == 0
     all_good = np.bincount(node_of_row, good, minlength=n) == d
+    alone = all_good & (np.bincount(node_of_row, good & ~penalty, minlength=n) == 0)
+    if alone.any():
+        live = entry.data != 0
+        near = (np.ones(live.sum()), (node_of_row[entry.row[live]], node_of_row[entry.col[live]]))
+        graph = sp.csr_array(near, shape=(n, n))
+        between = sp.diags_array(alone.astype(float))
+        _, patch = connected_components(sp.csr_array(between @ graph @ between), directed=False)
+        beside = np.bincount(patch, graph @ (~all_good).astype(float) > 0) > 0
+        all_good &= ~(alone & beside[patch])
     return np.asarray(all_good[node_of_row] & good)
 
 

@@ -1,6 +1,7 @@
 """Coordinates from an elasticity matrix: the whole room on one page."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,13 +16,13 @@ from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import NodeNumbering
 from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Body, Examined, Placed, finish
-from ..tolerances import ALIKE, CERTIFIED, SIGMAS
+from ..tolerances import ALIKE, CERTIFIED, PENALTY, PLACED, SIGMAS
 from ..words import GIVE_NUMBERING, Reason
 from .doubts import guessed_directions, notes, unborne, unchecked, unconfirmed
 from .materials.cells import RecognisedCells, recognise_cells
-from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, without_springs
+from .nullspace.residuals import residuals
 from .positions import solve
 from .verdict import (
     NOTHING_CHECKED,
@@ -31,6 +32,8 @@ from .verdict import (
     beside_cells,
     contrast,
     examined,
+    given_back,
+    hidden_by_digits,
     hidden_elements,
     no_positions,
 )
@@ -108,7 +111,7 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
         objections.append(NOTHING_CHECKED)
     if any(map(_flat, bodies)):
         objections.append(Reason("the points lie in one line or plane, and no solid body does"))
-    if found.hidden > 0:
+    if found.hidden > 0 and not rounding:
         objections.append(hidden_elements(found.hidden))
     if alone and cells and contrast(nodal) > 1 / ALIKE:
         objections.append(WEAK_AND_UNKNOWN)
@@ -117,6 +120,8 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
     guessed = guessed_directions(numbering, loose)
     masks, asked = (withheld, hanging, lone), shown if cells else None
     said = (*solution.warnings, *notes(nodal, solution, asked, loose, masks, int(guessed.sum())))
+    if found.hidden > 0 and rounding:  # holes look the same
+        said = (*said, hidden_by_digits(found.hidden))
     rows = replace(numbering, direction_of_row=np.where(guessed, -1, numbering.direction_of_row))
     free = "the sign of the scale is free: with a mesh its point reflection fits the matrix as well"
     another = None
@@ -148,17 +153,16 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
 
     def compare(body: Body) -> BodyComparison:
         fit = found.backward_error if found.certified else error
-        return BodyComparison(_certificate(request, body, elements=found.certified), fit)
+        return BodyComparison(_certificate(request, body, elements=found.certified), allowed, fit)
 
     def examine(_: Body, compared: BodyComparison) -> Examined:
         certificate, most = compared.certificate, float(allowed.max())
-        beside = certificate.silent(most)
-        against = [*objections, *against_body(certificate, beside, allowed)]
-        fits, remarks = sure, []
-        if len(beside):
-            fits = f"{sure}, in all rows but {len(beside):,} of {len(allowed):,}"
-            remarks = [beside_cells(len(beside))]
-        return Examined(Findings((fits,), compared.backward_error, tuple(against), another, allowed=most), remarks)
+        unlike = list(against_body(certificate, compared.foreign[0], allowed))
+        against = dict.fromkeys([*objections, *unlike])
+        beside = len(certificate.silent(allowed))
+        fits = given_back(sure, compared.backward_error, beside, len(allowed), exact=request.rounding is None)
+        remarks = [beside_cells(beside)] if beside and not unlike else []  # not of wrong entries
+        return Examined(Findings(fits, compared.backward_error, tuple(against), another, allowed=most), remarks)
 
     return finish(request.clock, place, compare, examine)
 
@@ -168,17 +172,24 @@ class BodyComparison:
     """A body as it is written, compared with its matrix."""
 
     certificate: BodyCertificate
+    allowed: NDArray[np.float64]  # (N,) how far off entries may be, relative to their row
     fit: float  # what the fit that found the body left
+
+    @cached_property
+    def foreign(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Entries (k, 2) that the elements leave and no others have, the largest first, and their sizes."""
+        return self.certificate.of_no_element(np.maximum(PLACED, self.allowed))
 
     @property
     def backward_error(self) -> float:
         """That of the certificate or, of a body of which it can compare nothing, that of the fit."""
         error = self.certificate.backward_error
-        return self.fit if np.isnan(error) else error
+        return max(self.fit if np.isnan(error) else error, self.foreign[1].max(initial=0.0))
 
     def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The entries that fit worst, and their misfits."""
-        return self.certificate.worst(count)
+        """The entries that fit worst, and their misfits; those that no elements have, if all others fit."""
+        pairs, misfits = self.certificate.worst(count, self.allowed)
+        return (pairs, misfits) if len(pairs) else (self.foreign[0][:count], self.foreign[1][:count])
 
 
 def _rounded_rows(rounding: Rounding, nodal: NodalMatrix, solution: Solution, bar: Known | None) -> NDArray[np.float64]:
@@ -187,9 +198,9 @@ def _rounded_rows(rounding: Rounding, nodal: NodalMatrix, solution: Solution, ba
     Decimals are few for weak rows. Positions that are off by some part of the diameter change the entries of the
     shortest distance most.
     """
-    unit = np.asarray(abs(rounding.unit).max(axis=1).todense()).ravel()
-    matrix = abs(rounding.exact)
-    largest = np.asarray((matrix - sp.diags_array(matrix.diagonal())).max(axis=1).todense()).ravel()
+    largest = _largest_off_diagonal(rounding.exact)
+    own = np.where(np.abs(rounding.exact.diagonal()) > PENALTY * largest, 0.0, np.abs(rounding.unit.diagonal()))
+    unit = np.maximum(_largest_off_diagonal(rounding.unit), own)  # penalties are not compared
     known = determined(solution.points)
     pair = known[nodal.node] & known[nodal.indices] & (nodal.node != nodal.indices)
     apart = solution.points[nodal.node[pair]] - solution.points[nodal.indices[pair]]
@@ -197,6 +208,15 @@ def _rounded_rows(rounding: Rounding, nodal: NodalMatrix, solution: Solution, ba
     diameter = np.linalg.norm(np.ptp(solution.points[known], axis=0)) if known.any() else 0.0
     moved = bar.error * diameter / shortest if bar and shortest > 0 else 0.0
     return rounding.spread + SIGMAS * (unit / np.where(largest > 0, largest, np.inf) + moved)
+
+
+def _largest_off_diagonal(matrix: sp.csr_array) -> NDArray[np.float64]:
+    """(N,) largest magnitude of the entries of each row off the diagonal."""
+    entry = matrix.tocoo()
+    off = entry.row != entry.col
+    largest = np.zeros(matrix.shape[0])
+    np.maximum.at(largest, entry.row[off], np.abs(entry.data[off]))
+    return largest
 
 
 def _certificate(request: Request, body: Body, *, elements: bool) -> BodyCertificate:

@@ -11,14 +11,18 @@ from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import NodeNumbering
 from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import CERTIFIED, PLACED, SMALL
-from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences, words_of
+from ..tolerances import CERTIFIED, SMALL
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import RecognisedCells
 from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_CHECKED = Reason(
     "no identities have others to check against, and no elements re-assemble", advice=WITHOUT_SUPPORTS
+)
+NOTHING_COMPARED = Reason(
+    "no row of the matrix could be compared with the elements: next to each node others lack a position, or are gone",
+    advice=WITHOUT_SUPPORTS,
 )
 RESTS_ON_PLANES = Reason(
     "too much is free unless nodes that lack a direction lie in planes across it, and no elements show that they do",
@@ -43,37 +47,54 @@ def hidden_elements(count: int) -> Reason:
     return Reason(f"{weak} so weak beside others of the same nodes that rounding of the entries hides the material")
 
 
+def hidden_by_digits(count: int) -> str:
+    """That few digits hide weak elements, where there may be none."""
+    weak = "so weak that rounding of the entries hides them, or there are holes in their places"
+    return f"{count_of(count, 'element')} may be missing, or of another material than is said: {weak}"
+
+
 def against_body(
-    certificate: BodyCertificate, beside: NDArray[np.int64], allowed: NDArray[np.float64]
+    certificate: BodyCertificate, foreign: NDArray[np.int64], allowed: NDArray[np.float64]
 ) -> Iterator[Reason]:
     """What the certificate says against a body as it is written.
 
-    Errors are `allowed` by row, (N,); `beside` are rows that it does not compare and does not explain either, those
-    first of which elements leave most.
+    Errors are `allowed` by row, (N,); `foreign` are entries (k, 2) that elements leave and no others have.
     """
     if not len(certificate.misfits):
-        yield NOTHING_CHECKED
-        return
-    bound = allowed[certificate.pairs].max(axis=1)
-    wrong = np.flatnonzero(~(certificate.misfits <= bound))
+        yield NOTHING_CHECKED if certificate.remainder is None else NOTHING_COMPARED
+    wrong = np.flatnonzero(~(certificate.misfits <= certificate.bounds(allowed)))
     if len(wrong):
         worst = wrong[np.argmax(certificate.misfits[wrong])]
         rows = count_of(len(np.unique(certificate.pairs[wrong, 0])), "row")
         most = f"row {certificate.pairs[worst, 0]} is off by {certificate.misfits[worst]:.1e} of its largest entry"
         yield Reason(f"the body as it is written does not give {rows} of the matrix back: {most}")
-    elif not certificate.could_be_elements(max(PLACED, float(allowed.max()))):
-        rows = words_of(beside[:2]) if len(beside) else "that were not compared"
+    elif len(foreign):
+        row, column = foreign[0]
+        at = f"rows {row} and {column}" if row != column else f"row {row}"
         yield Reason(
-            f"the elements leave entries in rows {rows} that no other element or spring has",
+            f"the elements leave an entry in {at} that no other element or spring has",
             "an entry is wrong there, or an element is missing",
             advice="check the entries of these rows",
         )
 
 
+def given_back(sure: str, error: float, beside: int, order: int, *, exact: bool) -> tuple[str, ...]:
+    """What speaks for a body of which so many rows `beside` supports, of all, were not compared.
+
+    `sure` is what was known before the body was compared with its matrix, which left some `error`.
+    """
+    if not beside:
+        return (sure,)
+    rows = f"the elements give back {order - beside:,} of the {order:,} rows of the matrix to {error:.1e}"
+    compared = f"{rows}, and nothing is known to be wrong in the others"
+    return (compared,) if exact else (sure, compared)
+
+
 def beside_cells(count: int) -> str:
     """That rows next to supports are not explained by the elements that are listed."""
-    lost = f"{count_of(count, 'row is', 'rows are')} not compared: elements next to them have lost nodes"
-    return f"{lost}, as to supports. An element all of whose nodes lie there may be missing from the list"
+    rows = count_of(count, "row is", "rows are")
+    lost = f"{rows} not compared: they are next to supports, where elements may have lost nodes"
+    return f"{lost}. An element all of whose nodes lie there may be missing from the list"
 
 
 def examined(

@@ -72,8 +72,8 @@ class Recovery:
     #: that makes it so.
     density: float | None = None
     #: Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
-    #: entry of its row. For elasticity whose cells are not recognised the largest residual of a valid identity,
-    #: relative to the size of its row.
+    #: entry of its row. Of a body whose elements are not recognised the largest part of an identity that a row
+    #: leaves, over the distance of the farthest node to which it is coupled.
     backward_error: float = np.inf
     timings: Mapping[str, float] = field(default_factory=dict)  #: Seconds by stage.
     warnings: tuple[str, ...] = ()  #: What was changed, guessed or left open.

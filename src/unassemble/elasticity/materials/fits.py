@@ -15,7 +15,7 @@ from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
 from ...elements.surface import contested
 from ...linalg import threads
-from ...tolerances import ALIKE, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
+from ...tolerances import ALIKE, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
 from .entries import BlockEntries, MaterialModel, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
@@ -126,8 +126,7 @@ def cell_by_cell(
     most[nothing], lame[nothing] = 0, 0
     left = np.where(sure, left, np.maximum(left, LAST_DIGITS))
     weak = (most > 0) & (most < np.minimum(ALIKE, _FOUR_DIGITS * left))
-    hidden = int(weak.sum()) if entries.allowed <= CERTIFIED else 0
-    return lame, replace(entries, value=rest.reshape(entries.value.shape)), hidden
+    return lame, replace(entries, value=rest.reshape(entries.value.shape)), int(weak.sum())
 
 
 def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size: NDArray) -> NDArray[np.float64]:
@@ -165,7 +164,8 @@ def _fewest(model: MaterialModel, entries: BlockEntries) -> tuple[NDArray[np.flo
 
     Candidates that carry no material come out as weak cells, by rounding. A weak cell of the body is told from these
     by the entries, each relative to its own row: without it they are not explained. The third result counts the cells
-    of which rounding hides whether they are there, or of what material.
+    of which rounding hides whether they are there, or of what material. Where entries were rounded to few digits, holes
+    are among them, which look the same.
     """
     lame, rest = _least_squares(model, entries)
     most = model.most_added(Pairs.of(model.cells, entries), entries, lame)
@@ -181,8 +181,6 @@ def _fewest(model: MaterialModel, entries: BlockEntries) -> tuple[NDArray[np.flo
             kept, lame, rest = strong, np.zeros_like(lame), left
             lame[kept] = found
             break
-    if entries.allowed > CERTIFIED:  # of entries that are rounded, holes and weak cells look the same
-        return lame, rest, 0
     weak = kept & _uncertain(model, entries, lame, max(rest.largest, LAST_DIGITS))
     gone = ~kept & (most > _EXPLAINED)
     gone[gone] = ~contested(model.kind.base, np.vstack([model.cells[gone], model.cells[kept]]))[: gone.sum()]

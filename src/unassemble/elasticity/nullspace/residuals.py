@@ -1,7 +1,7 @@
-"""How well coordinates fit the matrix: the identities written out one by one.
+"""What the found positions leave of the identities, written out one by one.
 
-Nothing here is shared with the solver, which eliminates p and q by a projection; here they are eliminated by
-taking differences of equations that contain the same one.
+The solver eliminates p and q by a projection; here they are eliminated by taking differences of equations that contain
+the same one. These numbers tell how good a fit is. What a body is worth is decided by :mod:`unassemble.certificate`.
 """
 
 from collections.abc import Iterator
