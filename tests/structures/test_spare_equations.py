@@ -39,6 +39,18 @@ def test_springs_between_neighbours_earn_no_certificate(make, off):
         assert not sound(stiff.with_springs(turning(given)).matrix, rows_per_node(given))
 
 
+@pytest.mark.parametrize(("seed", "ends", "held"), [
+    (14, (1, 4), [3, 5, 7]), (16, (0, 1), [3, 6, 8]), (39, (7, 8), [1, 3, 4]), (54, (3, 6), [1, 2, 4]),
+    (58, (0, 1), [2, 4, 7]), (77, (0, 3), [4, 5, 7]),
+])  # fmt: skip
+def test_a_spring_along_a_member_of_a_grillage(seed, ends, held):
+    """Its length follows the spring in the forces about both axes, and differences of moments do not tell it."""
+    given = grillage((3, 3), seed).with_springs(np.array([3 * ends[0]]), np.array([3 * ends[1]]), share=0.1)
+    given = given.clamped(np.isin(np.arange(9), held))
+    sound(given.matrix, rows_per_node(given))
+    sound(given.permuted(seed).matrix, rows_per_node(given.permuted(seed)))
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_lattice_without_rotations_about_an_axis(axis):
     """Condensed unknowns leave forces whole, whose coordinates springs between neighbours change one by one."""

@@ -69,9 +69,9 @@ def unnoticed_in(
     since z . e = g . P e vanishes for all of them only if P e does. Not every e can come about: a spring between two
     nodes that translations do not stretch pulls both alike, so that sums of forces over a whole structure say nothing.
 
-    Disturbances are any of a single equation; springs between two coupled nodes; springs that are the same between
-    all coupled nodes, or between the rotations of all nodes and the ground, as regular lattices could take them for a
-    change of size. `row` counts the piece's own nodes, `probes` (m, k) are residuals of random right-hand sides.
+    Disturbances are any of a single equation; springs along an axis between two coupled nodes; springs that are the
+    same between all coupled nodes, or between the rotations of all nodes and the ground, as regular lattices could take
+    them for a change of size. `row` counts the piece's own nodes, `probes` (m, k) are residuals of random right-hand sides.
     """
     blind = _small(probes)
     b, moves, turns = layout.block_size, len(layout.displacements), len(layout.turning)
@@ -82,11 +82,7 @@ def unnoticed_in(
     weighted = np.vstack([probes, np.zeros(probes.shape[1])]) * weight[:, None]
     step = layout.rigid_motions(points[edges[:, 0]] - points[edges[:, 1]])[:, :, moves:]
     for a in range(moves):
-        one, other = place[edges[:, 0], a], place[edges[:, 1], a]  # (e, turns)
-        both = (one >= 0) & (other >= 0)
-        scale = np.where(both, np.hypot(weight[one], weight[other]), 1)[..., None]
-        lone = _small((weighted[one] - weighted[other]) / scale) & both
-        blind[one[lone]] = blind[other[lone]] = True
+        _blind_to_springs(blind, place[edges, a], step[:, a], weight, weighted)
         pull = np.zeros((len(points), turns))
         np.add.at(pull, edges[:, 0], step[:, a])
         np.add.at(pull, edges[:, 1], -step[:, a])
@@ -94,6 +90,24 @@ def unnoticed_in(
     for k in range(len(layout.rotations)):
         _blind_together(blind, place[:, moves + k, k], np.ones(len(points)), weighted)
     return blind
+
+
+def _blind_to_springs(
+    blind: NDArray, place: NDArray, step: NDArray[np.float64], weight: NDArray[np.float64], weighted: NDArray
+) -> None:
+    """Mark equations of forces along one axis that a spring between two nodes could change unnoticed.
+
+    The spring pulls at both nodes by what a rotation about any axis moves them against each other, `step` (e, turns).
+    So it enters the equations about all axes at once, `place` (e, 2, turns), of both nodes or of that which has some.
+    Coordinates that change along the line between the nodes may follow it in all of these, though in none alone.
+    """
+    largest = np.abs(step).max(axis=1, initial=0.0)[:, None]
+    step = np.where(np.abs(step) > CANCELLED * largest, step, 0.0)
+    pull = np.where(place >= 0, np.stack([step, -step], axis=1), 0.0)
+    size = np.sqrt(((pull * weight[place]) ** 2).sum(axis=(1, 2)))
+    seen = np.einsum("est,estp->ep", pull, weighted[place])
+    hidden = (size > 0) & _small(seen / np.where(size > 0, size, 1.0)[:, None])
+    blind[place[(pull != 0) & hidden[:, None, None]]] = True
 
 
 def _small(seen: NDArray) -> NDArray[np.bool_]:
