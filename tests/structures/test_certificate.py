@@ -110,6 +110,82 @@ def test_bars():
     assert set(range(12, 15)) & set(found.unexplained.tolist())
 
 
+def bars_of(given, matrix=None):
+    """The certificate of the joints of a truss whose rows stand joint by joint."""
+    rows = np.arange(given.matrix.shape[0])
+    matrix = given.matrix if matrix is None else sp.csr_array(matrix)
+    return check_bars(matrix, rows // given.block, rows % given.block, given.points, allowed=1e-9)
+
+
+def entry(order, row, column, value):
+    """A symmetric matrix of one number."""
+    one = sp.coo_array(([value], ([row], [column])), shape=(order, order))
+    return sp.csr_array(one + one.T) if row != column else sp.csr_array(one)
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.01, 0.5])
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("held", [None, 1e2, 1e10])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_wrong_entry_between_the_rows_of_a_joint_is_no_bar(d, size, held, sign):
+    given = truss(d, 25).permuted(1)
+    matrix, order, k = given.matrix, d * 25, 12 * d
+    largest = abs(matrix[k, : 12 * d]).max()
+    matrix = matrix + entry(order, k, k + 1, size * largest)
+    if held:  # by a penalty
+        matrix = matrix + entry(order, k, k, held * largest)
+    found = bars_of(given, sign * matrix)
+    assert found.backward_error > 1e-9
+    assert {k, k + 1} <= set(found.unexplained.tolist())
+    assert not found.rows[[k, k + 1]].any()
+    assert recover(sign * matrix).status != "certified"
+
+
+def test_supports_of_a_truss_are_explained_and_their_rows_do_not_count():
+    given = truss(2, 25).permuted(1)
+    order = given.matrix.shape[0]
+    largest = abs(given.matrix).max()
+    block = np.array([[2.0, 1.0], [1.0, 1.0]]) * largest  # springs across the axes
+    place = np.repeat([8, 9], 2), np.tile([8, 9], 2)
+    sprung = given.matrix + sp.csr_array((block.ravel(), place), shape=(order, order))
+    for matrix, rows in (
+        (given.matrix + entry(order, 8, 8, 1e10 * largest), [8]),
+        (given.matrix + entry(order, 8, 8, 0.1 * largest), [8]),
+        (sprung, [8, 9]),
+    ):
+        found = bars_of(given, matrix)
+        assert found.backward_error < 1e-12
+        assert not len(found.unexplained)
+        assert np.flatnonzero(~found.rows).tolist() == rows
+        assert recover(matrix).status == "certified"
+
+
+@pytest.mark.parametrize("digits", [None, 12, 8])
+@pytest.mark.parametrize("keep", [[0], [1], []])
+def test_joints_next_to_supports_that_were_taken_out_are_explained(keep, digits):
+    given = truss(2, 30, 3)
+    rows = np.arange(60)
+    left = rows[(rows // 2 >= 4) | np.isin(rows % 2, keep)]
+    matrix = sp.csr_array(given.matrix[left][:, left])
+    if digits:
+        matrix.data = np.array([float(f"{x:.{digits - 1}e}") for x in matrix.data])
+    allowed = 1e-9 if digits is None else 10.0 ** (2 - digits)
+    found = check_bars(matrix, left // 2, left % 2, given.points, allowed=max(allowed, 1e-9))
+    assert found.backward_error < max(allowed, 1e-12)
+    assert not len(found.unexplained)
+    assert 0.3 < found.share < 1
+
+
+def test_nothing_is_compared_where_no_two_joints_have_positions():
+    given = truss(2, 25)
+    alone = given.points.copy()
+    alone[1:] = np.nan
+    rows = np.arange(50)
+    found = check_bars(given.matrix, rows // 2, rows % 2, alone, allowed=1e-9)
+    assert np.isnan(found.backward_error)
+    assert not found.rows.any()
+
+
 @pytest.mark.parametrize("make", [frame, lambda: truss(3, 40)])
 def test_the_backward_error_is_that_of_points_after_anchors(make):
     given = make()

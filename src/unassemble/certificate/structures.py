@@ -18,14 +18,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..tolerances import LAST_DIGITS, PENALTY
+from ..tolerances import LAST_DIGITS, LITTLE, PENALTY
 
 
 @dataclass(frozen=True, eq=False)
 class StructureCheck:
     """What the matrix of a structure says of coordinates."""
 
-    backward_error: float  # largest force, or misfit of a member, relative to its row or block; infinite if none counts
+    # largest force, or misfit of a member, relative to its row or block; NaN if nothing was compared
+    backward_error: float
     rows: NDArray[np.bool_]  # (N,) rows that say so
     unknowns: NDArray[np.bool_]  # (N,) that these touch
     unexplained: NDArray[np.int64]  # rows that lack nothing and yet do not annihilate a rotation, the worst first
@@ -101,8 +102,12 @@ def check_bars(
     """Hold the matrix (N, N) of a truss against points (n, d), NaN where a node has none.
 
     The block of two nodes is that of a bar between them, - k e e^T, whose stiffness k is taken from the block itself.
-    What is left of an entry is relative to the largest entry that couples its node to another. A node's own block is
-    the sum of its bars; what supports and springs to the ground add to it is positive semidefinite.
+    What is left of an entry is relative to the largest entry that couples its node to another. By node and not by row,
+    since a row across all bars of its node has nothing but their rounding.
+
+    The block of a node by itself is the sum of its bars, k e e^T. What these leave may be a spring to the ground, or
+    bars to nodes that are not there: that is positive semidefinite, with the sign of the matrix, and the rows of such a
+    node do not count. Anything else is not explained.
     """
     n, d = points.shape
     entry = matrix.tocoo()
@@ -114,9 +119,9 @@ def check_bars(
     counts = np.bincount(row, minlength=len(node_of_row)) > 0
     along = points[i] - points[j]
     length = np.linalg.norm(along, axis=1)
-    if not len(row) or (length == 0).any():  # a bar without length has no direction
+    if (length == 0).any():  # a bar without length has no direction
         return StructureCheck(float("inf"), counts, _touched(matrix, counts), np.unique(row[length == 0]))
-    e = along / length[:, None]
+    e = along / length[:, None] if d else along
     bar = np.take_along_axis(e, a[:, None], axis=1)[:, 0] * np.take_along_axis(e, b[:, None], axis=1)[:, 0]
     _, first, pair = np.unique(i * n + j, return_index=True, return_inverse=True)
     weight = np.bincount(pair, bar * bar)
@@ -126,40 +131,64 @@ def check_bars(
     left = np.abs(value - force[pair] * bar) / np.where(size[i] > 0, size[i], 1.0)
     worst = np.zeros(len(node_of_row))
     np.maximum.at(worst, row, left)
-    own, asked = _own_blocks(matrix, node_of_row, direction_of_row, known, d)
-    np.add.at(own, i[first], force[:, None, None] * e[first][:, :, None] * e[first][:, None, :])
-    own /= np.where(size > 0, size, 1.0)[:, None, None]
-    sign = np.sign(matrix.diagonal().sum())
-    least = np.linalg.eigvalsh(sign * (own + own.transpose(0, 2, 1)) / 2)[:, 0]
-    below = np.where(asked & (size > 0), np.maximum(-least, 0.0), 0.0)
-    worst = np.maximum(worst, below[node_of_row] * counts)
+
+    # A bar to a node of which few directions are left, and those across it, does not tell its stiffness.
+    stiffness = np.where(weight >= LITTLE, -force, 0.0)
+    bars = np.zeros((n, d, d))
+    np.add.at(bars, i[first], stiffness[:, None, None] * e[first][:, :, None] * e[first][:, None, :])
+    wrong, given_back = _own_blocks(matrix, node_of_row, direction_of_row, bars, size, allowed)
+    np.maximum.at(worst, np.arange(len(worst)), np.where(counts, wrong, 0.0))
+    counts &= given_back
     order = np.argsort(-worst, kind="stable")
     unexplained = order[: np.count_nonzero(worst > allowed)]
-    return StructureCheck(float(worst.max()), counts, _touched(matrix, counts), unexplained)
+    error = float(worst.max(initial=0.0)) if len(row) else float("nan")
+    return StructureCheck(error, counts, _touched(matrix, counts), unexplained)
 
 
 def _own_blocks(
     matrix: sp.csr_array,
-    node_of_row: NDArray[np.int64],
-    direction_of_row: NDArray[np.int64],
-    known: NDArray[np.bool_],
-    d: int,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    bars: NDArray[np.float64],
+    size: NDArray[np.float64],
+    allowed: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(n, d, d) blocks of nodes with themselves, and (n,) nodes that have all rows, and neighbours with positions."""
-    n, entry = len(known), matrix.tocoo()
-    i, j = node_of_row[entry.row], node_of_row[entry.col]
-    a, b = direction_of_row[entry.row], direction_of_row[entry.col]
-    named = (a >= 0) & (b >= 0)
-    same = named & (i == j)
-    blocks = np.zeros((n, d, d))
-    np.add.at(blocks, (i[same], a[same], b[same]), entry.data[same])
-    rows = np.bincount(node_of_row[direction_of_row >= 0], minlength=n)
-    lacking = np.bincount(i, (~known[j] | ~named) & (entry.data != 0), n)
-    return blocks, known & (rows == d) & (lacking == 0)
+    """What `bars` (n, d, d) leave of each node's own block and nothing explains, by row, (N,).
+
+    Where it is more than is `allowed`, that is how far it is from positive semidefinite. Relative to the sizes (n,) of
+    nodes, or to a penalty on the diagonal, which is rounded as a whole. With rows (N,) that bars give back.
+    """
+    n, d, _ = bars.shape
+    entry = matrix.tocoo()
+    own = (node[entry.row] == node[entry.col]) & (direction[entry.row] >= 0) & (direction[entry.col] >= 0)
+    row, column, value = entry.row[own], entry.col[own], entry.data[own]
+    there = np.zeros((n, d), dtype=bool)
+    there[node[direction >= 0], direction[direction >= 0]] = True
+    left = -bars * (there[:, :, None] & there[:, None, :])
+    np.add.at(left, (node[row], direction[row], direction[column]), value)
+    left *= np.sign(matrix.diagonal().sum())
+    left = (left + left.transpose(0, 2, 1)) / 2
+    unit = np.where(size > 0, size, 1.0)
+    diagonal = np.diagonal(left, axis1=1, axis2=2)
+    scale = np.sqrt(np.maximum(unit[:, None], np.abs(diagonal)))
+    relative = left / (scale[:, :, None] * scale[:, None, :])
+    wrong = np.maximum(-np.linalg.eigvalsh(relative)[:, 0], 0.0) if d else np.zeros(n)
+
+    # What has nothing on the diagonal has nothing beside it, however large the other diagonal entry is.
+    across = np.abs(left) / unit[:, None, None]
+    across[:, np.arange(d), np.arange(d)] = 0.0
+    empty = diagonal <= allowed * unit[:, None]
+    beside = np.where(empty[:, :, None] | empty[:, None, :], across, 0.0)
+    wrong = np.maximum(wrong, beside.max(axis=(1, 2), initial=0.0))
+    rest = (np.abs(left) / unit[:, None, None]).max(axis=2, initial=0.0)
+    of_row = np.zeros(len(node))
+    told = direction >= 0
+    of_row[told] = rest[node[told], direction[told]]
+    return np.where(of_row > allowed, wrong[node], of_row), of_row <= allowed
 
 
 def _touched(matrix: sp.csr_array, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) unknowns in these rows, (N,)."""
+    """(N,) unknowns that some rows (N,) couple to."""
     return np.asarray(abs(matrix[np.flatnonzero(rows)]).sum(axis=0)).ravel() > 0
 
 
