@@ -85,9 +85,9 @@ def check_structure(
         misfit = _members(matrix, node_of_row, direction_of_row, x, displacements, rotations, members)
         counts |= _only_members(matrix, node_of_row, members) & ~others
     said = np.where(forces.due & ~(wrong & ground) & ~others[:, None], relative, 0.0).max(initial=0.0)
-    error = max(float(said), float(misfit.max(initial=0.0)))
-    if not counts.any() and error <= allowed:  # nothing was compared that would have shown an error
-        error = float("inf")
+    error = float(np.maximum(said, misfit.max(initial=0.0)))  # NaN stays
+    if error <= allowed and not counts.any():  # all that is wrong is excused, and nothing is right
+        error = float("nan")
     return StructureCheck(error, counts, _touched(matrix, counts), unexplained)
 
 

@@ -122,7 +122,8 @@ def anchored(
         before = size * points[body]
         shift = wanted.mean(axis=0) - (size * found).mean(axis=0)
         points[body] = before + shift
-        lost = max(lost, float(np.abs((points[body] - shift) - before).max() / abs(size)) / edge)
+        off = np.abs((points[body] - shift) - before).max() / abs(size)
+        lost = float(np.maximum(lost, off / edge))  # NaN stays
         misfit = float(np.linalg.norm(points[nodes[here]] - wanted, axis=1).max())
         if here.sum() > 1 and misfit > ALIKE * np.linalg.norm(y, axis=1).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")

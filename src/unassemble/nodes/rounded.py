@@ -128,6 +128,11 @@ def _without_sums(matrix: sp.csr_array, direction: NDArray[np.int64], zero: NDAr
     return sp.csr_array(entry)
 
 
+def misfits_allowed(rounding: Rounding | None) -> float:
+    """The largest misfit, relative to what makes it up, that entries of this rounding, or of none, explain."""
+    return max(CERTIFIED, rounding.spread) if rounding else CERTIFIED
+
+
 @dataclass(frozen=True)
 class Known:
     """How well positions are known."""
@@ -137,13 +142,13 @@ class Known:
 
     def objections(self, misfit: float, rounding: Rounding | None, said: str) -> Iterator[Reason]:
         """Why positions are not certified that leave some largest misfit, which is `said`."""
-        allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
-        far = f"positions may be off by {self.error:.0e} of the size"
-        if not (misfit <= allowed and self.explained):
+        needed = rounding.needed if rounding else ALIKE
+        fits = misfit <= misfits_allowed(rounding) and self.explained
+        if not fits:
             yield Reason(f"{said}, more than entries rounded to {rounding.name} leave" if rounding else said)
-            said = ""
         if not self.error <= needed:
-            yield Reason(f"{said}, and {far}" if said else far)
+            far = f"{self.error:.0e} of the size" if np.isfinite(self.error) else "any distance"
+            yield Reason(f"{said}, and positions may be off by {far}" if fits else f"positions may be off by {far}")
 
     def within(self, rounding: Rounding | None) -> str:
         """How far positions are known, in words; empty for entries of full precision."""
@@ -168,6 +173,7 @@ def known_to(
     whether the matrix tells size and sign.
     """
     pieces = [np.flatnonzero(component == one) for one in np.unique(component[component >= 0])]
+    pieces = [piece for piece in pieces if len(piece) > 1]  # a single node has no place relative to others
     moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))
     try:
         for seed in range(REDRAWN):

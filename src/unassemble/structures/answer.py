@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 from ..certificate import Findings, StructureCheck
 from ..nodes.anchoring import Request, anchored, mechanical_fields
 from ..nodes.numbering import Rows
-from ..nodes.rounded import Known, Rounding, known_to
+from ..nodes.rounded import Known, Rounding, known_to, misfits_allowed
 from ..recovery import Examined, Placed, Structure, finish
 from ..tolerances import CERTIFIED, ROUNDED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, words_of
 from .placed import PlacedNodes
 
 _LOADED = (
-    "sums of moments are not whole, or contradict those of forces, and forces alone do not tell the size of this "
-    "structure: with axial forces in its members, or springs between its nodes, they fit another size as well"
+    "only forces tell the size of this structure, for its moments are incomplete or contradict them; and with axial "
+    "forces in its members, or springs between its nodes, forces fit another size as well"
 )
+_NOTHING_COMPARED = "all rows of the matrix lack something, so that none of them can be held against the coordinates"
+_NO_LENGTH = "nodes that members join lie in one place, or entries are missing that these members have"
 _WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without springs"
 
 
@@ -28,7 +30,7 @@ _WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without s
 class HeldStructure:
     """Positions held against the matrix."""
 
-    error: float  # the largest misfit
+    error: float  # the largest misfit; NaN where there is none
     check: Callable[[NDArray[np.float64]], StructureCheck]  # of points as they are written, by formulas of its own
     misfits: NDArray[np.float64]  # (k,), with their signs
     again: Callable[[sp.csr_array], tuple[NDArray, NDArray]]  # points and misfits of a matrix rounded otherwise
@@ -38,14 +40,21 @@ class HeldStructure:
     def known(self, found: PlacedNodes, *, sized: bool) -> Known:
         """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
         if self.rounding is None:
+            if np.isnan(self.error):
+                return Known(float("inf"))
             loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
             return Known(float(self.error * np.sqrt(loosest.rows) / loosest.gap))
         return known_to(found.points, found.component, self.misfits, self.rounding, self.again, sized=sized)
 
     def objections(self, found: PlacedNodes, known: Known, check: StructureCheck) -> Iterator[Reason]:
         """What speaks against the positions."""
-        error = max(self.error, check.backward_error)
-        yield from known.objections(error, self.rounding, self.said[1].format(error=error) + _most_in(check))
+        errors = [one for one in (self.error, check.backward_error) if not np.isnan(one)]
+        error = max(errors, default=0.0)
+        if len(errors) < 2 and error <= misfits_allowed(self.rounding):
+            yield Reason(_NOTHING_COMPARED, advice=WITHOUT_SUPPORTS)
+        else:
+            said = _NO_LENGTH if np.isinf(error) else self.said[1].format(error=error)
+            yield from known.objections(error, self.rounding, said + _most_in(check))
         if found.loaded:
             yield Reason(_LOADED, advice=_WITHOUT_LOADS)
         if found.unnoticed.any():

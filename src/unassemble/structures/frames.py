@@ -69,7 +69,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
     other = pairs[~np.isin(pairs @ [nodes.n, 1], ends @ [nodes.n, 1])]  # whose blocks are no members'
     used = (used | np.isin(node, ends) & ~np.isin(node, other)) & ~np.isin(node, found.spoiled)
-    error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
+    error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("nan")
     blocks = f", {count_of(len(ends), 'block is that', 'blocks are those')} of straight members" if len(ends) else ""
     left = "rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
     said = f"rigid rotations of the nodes cause no forces{blocks}", left
