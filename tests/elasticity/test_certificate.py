@@ -7,7 +7,7 @@ from assembled import ELEMENTS, box, heterogeneous, on_plane, permuted_nodes, st
 
 from unassemble import recover
 from unassemble.certificate import certify_body, certify_positions
-from unassemble.elasticity.verdict import against_body
+from unassemble.elasticity import against_body
 
 COUNTS = {"tri": (5, 6), "qua": (5, 6), "tet": (3, 4, 3), "hex": (3, 4, 3)}
 

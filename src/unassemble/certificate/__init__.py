@@ -20,9 +20,9 @@ from .planar import certify as certify, certify_mesh as certify_mesh
 from .spare import without_spare_equations as without_spare_equations
 from .structures import (
     StructureCheck as StructureCheck,
-    check_bars as check_bars,
     check_structure as check_structure,
 )
+from .trusses import check_bars as check_bars
 from .verdict import (
     UNJUDGED as UNJUDGED,
     Findings as Findings,

@@ -12,11 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
-from ..budget import AT_ONCE, SAMPLE
+from ..budget import AT_ONCE
 from ..tolerances import CANCELLED, CERTIFIED, PENALTY, ROUNDED
 from .comparison import relative
+from .semidefinite import semidefinite
 from .solids import Rule, rules_of, stiffness
 
 
@@ -69,7 +69,7 @@ class BodyCertificate:
         of a spring, and so is any sum of them. What a wrong entry leaves mostly is not. `allowed` is how far below zero
         an eigenvalue may be, relative to the rows: a number, or one for each row, (N,).
         """
-        return self.remainder is None or _semidefinite(self.remainder, allowed)
+        return self.remainder is None or semidefinite(self.remainder, allowed)
 
     def of_no_element(self, allowed: float | NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Entries (k, 2) that cells leave and no other elements have, the largest first, and their sizes; or none.
@@ -211,25 +211,6 @@ def _remainder(
     there = asked[rest.row] & asked[rest.col] & (np.abs(value) > ROUNDED)
     sign = np.sign(given.diagonal().sum())
     return sp.csr_array((sign * value[there], (rest.row[there], rest.col[there])), shape=rest.shape)
-
-
-def _semidefinite(matrix: sp.csr_array, allowed: float | NDArray[np.float64]) -> bool:
-    """Whether no eigenvalue of a symmetric matrix is below minus what is allowed, one number or one for each row.
-
-    By Sylvester's law of inertia: the pivots of the matrix, with as much added to its diagonal, are positive.
-    """
-    rows = np.unique(matrix.tocoo().row)
-    if not len(rows):
-        return True
-    shift = np.broadcast_to(np.asarray(allowed, dtype=float), matrix.shape[:1])[rows]
-    some = sp.csc_array(matrix[rows][:, rows] + sp.diags_array(shift))
-    if len(rows) <= SAMPLE // 4:
-        return bool(np.linalg.eigvalsh(some.toarray())[0] > 0)
-    try:
-        factor = splu(some, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:  # a pivot is zero
-        return False
-    return bool((factor.U.diagonal() > 0).all() and np.array_equal(factor.perm_r, factor.perm_c))
 
 
 def _row_sizes(matrix: sp.csr_array, node_of_row: NDArray) -> NDArray[np.float64]:

@@ -2,3 +2,4 @@
 
 from ..nodes import Request as Request
 from .recover import serve_body as serve_body
+from .verdict import against_body as against_body
