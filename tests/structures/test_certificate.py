@@ -9,7 +9,7 @@ from built import PLANE, PLATE, frame, grillage, plane_frame, plate, shell, trus
 
 from unassemble import recover
 from unassemble.certificate import check_bars, check_structure
-from unassemble.nodes.rounded import Known, known_to, with_exact_sums
+from unassemble.nodes import Known, known_to, with_exact_sums
 
 AXES = {6: ((0, 1, 2), (0, 1, 2)), PLANE: ((0, 1), (2,)), PLATE: ((2,), (0, 1))}
 MAKE = [frame, plane_frame, grillage, plate, shell]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from ..budget import AT_ONCE
-from ..tolerances import CANCELLED, CERTIFIED, PENALTY, ROUNDED
+from ..tolerances import CANCELLED, CERTIFIED, PENALTY
 from .comparison import relative
-from .semidefinite import semidefinite
+from .semidefinite import remainder_of, semidefinite
 from .solids import Rule, rules_of, stiffness
 
 
@@ -119,7 +119,7 @@ def certify_body(
     for rule in rules_of(rich) if names else ():
         assembled = _assembled(row_of, points, blocks, lame, usual | {rich: rule}, len(node_of_row)).tocoo()
         found = _compared(given, assembled, compared, penalty, size)
-        rest = _remainder(given, assembled, size, known[node_of_row] & named)
+        rest = remainder_of(given, assembled, size, known[node_of_row] & named)
         if best is None or not best.backward_error <= found.backward_error:
             best = replace(found, remainder=rest)
         if best.backward_error <= CERTIFIED:
@@ -195,22 +195,6 @@ def _nothing(order: int) -> BodyCertificate:
     return BodyCertificate(
         float("nan"), np.empty((0, 2), np.int64), np.empty(0), np.zeros(order, dtype=bool), np.empty(0, np.int64)
     )
-
-
-def _remainder(
-    given: sp.coo_array, assembled: sp.coo_array, size: NDArray[np.float64], asked: NDArray[np.bool_]
-) -> sp.csr_array:
-    """What cells leave of the entries between rows that are `asked`, (N,), over the root of the sizes of both rows.
-
-    With the sign of the diagonal. What is rounding is left out. A penalty counts for the size of its row.
-    """
-    rest = (given.tocsr() - assembled.tocsr()).tocoo()
-    own = np.maximum(size, np.abs(rest.diagonal()))
-    own = np.where(asked & (own > 0), own, 1.0)
-    value = rest.data / np.sqrt(own[rest.row] * own[rest.col])
-    there = asked[rest.row] & asked[rest.col] & (np.abs(value) > ROUNDED)
-    sign = np.sign(given.diagonal().sum())
-    return sp.csr_array((sign * value[there], (rest.row[there], rest.col[there])), shape=rest.shape)
 
 
 def _row_sizes(matrix: sp.csr_array, node_of_row: NDArray) -> NDArray[np.float64]:

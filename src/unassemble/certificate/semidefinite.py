@@ -1,4 +1,4 @@
-"""Whether a symmetric matrix has no negative eigenvalue."""
+"""What cells leave of a matrix, and whether it has no negative eigenvalue."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -6,6 +6,23 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from ..budget import SAMPLE
+from ..tolerances import ROUNDED
+
+
+def remainder_of(
+    given: sp.coo_array, assembled: sp.coo_array, size: NDArray[np.float64], asked: NDArray[np.bool_]
+) -> sp.csr_array:
+    """What cells leave of the entries between rows that are `asked`, (N,), over the root of the sizes of both rows.
+
+    With the sign of the diagonal. What is rounding is left out. A penalty counts for the size of its row.
+    """
+    rest = (given.tocsr() - assembled.tocsr()).tocoo()
+    own = np.maximum(size, np.abs(rest.diagonal()))
+    own = np.where(asked & (own > 0), own, 1.0)
+    value = rest.data / np.sqrt(own[rest.row] * own[rest.col])
+    there = asked[rest.row] & asked[rest.col] & (np.abs(value) > ROUNDED)
+    sign = np.sign(given.diagonal().sum())
+    return sp.csr_array((sign * value[there], (rest.row[there], rest.col[there])), shape=rest.shape)
 
 
 def semidefinite(matrix: sp.csr_array, allowed: float | NDArray[np.float64]) -> bool:
