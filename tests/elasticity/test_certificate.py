@@ -179,6 +179,17 @@ def test_penalties_hide_no_wrong_entry_beside_them(directions, penalty, digits):
         assert not recover(changed if digits is None else written(changed, digits)).certified
 
 
+def test_elements_all_of_whose_nodes_have_penalties_may_be_missing():
+    """No row without a penalty shows them, which a warning says."""
+    case = body("tet-p1", lam=1.5)
+    flat = case.points[:, :2]
+    held = (np.isclose(flat, flat.min(axis=0)) | np.isclose(flat, flat.max(axis=0))).any(axis=1)
+    found = recover(sp.csr_array(case.matrix + sp.diags_array(1e8 * np.repeat(held, 3))))
+    assert found.certified, found.reason
+    whole = recover(case.matrix)
+    assert found.n_cells == whole.n_cells or any("may be missing" in warning for warning in found.warnings)
+
+
 def test_a_body_of_which_nothing_can_be_compared_is_not_certified():
     case = body("quad-q1", lam=1.5)
     found = recover(case.matrix)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from ..budget import AT_ONCE
-from ..tolerances import CANCELLED, CERTIFIED, PENALTY
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED, PENALTY
 from .comparison import relative
 from .semidefinite import remainder_of, semidefinite
 from .solids import Rule, rules_of, stiffness
@@ -118,7 +118,8 @@ def certify_body(
     usual = {name: next(rules_of(name)) for name in names}
     for rule in rules_of(rich) if names else ():
         assembled = _assembled(row_of, points, blocks, lame, usual | {rich: rule}, len(node_of_row)).tocoo()
-        found = _compared(given, assembled, compared, penalty, size)
+        rows = compared & ~_hidden(given, assembled, compared, node_of_row, size)
+        found = _compared(given, assembled, rows, penalty, size)
         rest = remainder_of(given, assembled, size, known[node_of_row] & named)
         if best is None or not best.backward_error <= found.backward_error:
             best = replace(found, remainder=rest)
@@ -251,6 +252,29 @@ def _surrounded(
         beside = np.bincount(patch, graph @ (~all_good).astype(float) > 0) > 0
         all_good &= ~(alone & beside[patch])
     return np.asarray(all_good[node_of_row] & good)
+
+
+def _hidden(
+    given: sp.coo_array,
+    assembled: sp.coo_array,
+    compared: NDArray[np.bool_],
+    node_of_row: NDArray,
+    size: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(N,) rows of nodes with penalties among which elements may be missing from the list, as no other rows show them.
+
+    Cells leave entries between these nodes then, and any two of an element's nodes have a third in common. What is left
+    of one wrong entry joins two nodes only.
+    """
+    penalty = np.abs(given.tocsr().diagonal()) > PENALTY * size
+    n = int(node_of_row.max(initial=-1)) + 1
+    held = np.bincount(node_of_row, compared & penalty, n) > 0
+    rest = (given.tocsr() - assembled.tocsr()).tocoo()
+    i, j = node_of_row[rest.row], node_of_row[rest.col]
+    left = held[i] & held[j] & (i != j) & (np.abs(rest.data) > ALIKE * np.minimum(size[rest.row], size[rest.col]))
+    near = sp.csr_array((np.ones(left.sum()), (i[left], j[left])), shape=(n, n))
+    third = sp.csr_array((near @ near).multiply(near))
+    return np.asarray(third.sum(axis=1)).ravel()[node_of_row] > 0
 
 
 def _without_springs(
