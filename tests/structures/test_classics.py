@@ -21,7 +21,7 @@ CERTIFIED = {
     "bcsstk14": ("frame or shell", 257, 301, 64),
     "bcsstk19": ("plane frame", 271, 273, 98),
     "bcsstk20": ("plane frame", 159, 165, 96),
-    "bcsstk26": ("frame or shell", 313, 341, 89),
+    "bcsstk26": ("frame or shell", 312, 341, 89),
     "nos1": ("plane frame", 79, 79, 100),
     "nos2": ("plane frame", 319, 319, 100),
     "nos4": ("truss", 50, 50, 93),
@@ -30,7 +30,7 @@ CERTIFIED = {
     "LFAT5": ("plane frame", 3, 5, 29),
     "s1rmq4m1": ("frame or shell", 870, 959, 86),
     "s1rmt3m1": ("frame or shell", 869, 961, 86),
-    "s3rmt3m3": ("frame or shell", 844, 940, 86),
+    "s3rmt3m3": ("frame or shell", 843, 940, 86),
 }
 
 
@@ -121,7 +121,7 @@ def test_a_reactor_floor_was_drawn_in_hundredths():
     found = read("bcsstk26")
     points = found.points[np.isfinite(found.points).all(axis=1)]
     places = 100 * (points - points[0])
-    assert len(places) == 313
+    assert len(places) == 312
     assert np.abs(places - np.round(places)).max() < 1e-6
     assert any("the rows of 1 node (249) contradict the others" in note for note in found.warnings)
 

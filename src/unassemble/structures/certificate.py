@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
-from ..tolerances import ALIKE, CANCELLED
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from .layouts import PLANE, Layout
 from .members import balanced
 from .nodes import Nodes
@@ -91,6 +91,55 @@ def mispaired(
     strange &= known[first] | known[second]
     k = np.argmax(strange) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
+
+
+def next_to_gaps(row_of: NDArray[np.int64], untold: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n, b) rows by node that may be those of the next node or of the one before.
+
+    Where rows stand node by node and some are missing, the first row of a node may have been taken for the last one of
+    the node before, or the other way round. Then that one is left with fewer rows, whose directions are `untold` (N,).
+    """
+    beside = np.zeros(len(untold), dtype=bool)
+    beside[1:] |= untold[:-1]
+    beside[:-1] |= untold[1:]
+    return np.asarray((row_of >= 0) & beside[row_of])
+
+
+def shown(
+    nodes: Nodes, members: Straight, points: NDArray[np.float64], valid: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(n, b) rows of nodes that equations show to be theirs, and of their direction.
+
+    A row that annihilates translations shows it: its own entry takes part in that if it is a displacement, and does not
+    if it is a rotation. So does an entry in a force on another node that vanishes under a rotation, `valid` (n, b,
+    rotations), or in the block of a straight member; by so much that others in its place would be noticed, ten times of
+    what certificates allow.
+    """
+    n, b, moves = nodes.n, nodes.layout.block_size, len(nodes.layout.displacements)
+    known, least = determined(points), 10 * CERTIFIED
+    columns = [nodes.direction(k) for k in range(moves)]
+    sums = np.column_stack([np.asarray(part.sum(axis=1)).ravel() for part in columns])
+    size = np.column_stack([np.asarray(abs(part).sum(axis=1)).ravel() for part in columns])
+    told = (np.abs(sums) <= CANCELLED * size).all(axis=1) & size.any(axis=1)
+    entry = nodes.matrix.tocoo()
+    size = np.zeros((n * b, 1))  # about all axes together, as forces are measured: about one they may be rounding
+    terms = []
+    for k in range(b):
+        some = (entry.col % b == k) & known[entry.row // b] & known[entry.col // b]
+        row, column = entry.row[some], entry.col[some]
+        motion = nodes.layout.rigid_motions(points[column // b] - points[row // b])[:, k, moves:]
+        term = np.abs(entry.data[some, None] * motion)
+        np.add.at(size, row, term.sum(axis=1, keepdims=True))
+        terms.append((row, column, term))
+    for row, column, term in terms:
+        counts = (term > least * size[row]) & valid.reshape(n * b, -1)[row] & (row // b != column // b)[:, None]
+        told[column[counts.any(axis=1)]] = True
+    for side, block in enumerate((members.blocks, members.blocks.transpose(0, 2, 1))):
+        for part in (slice(moves), slice(moves, None)):
+            large = np.abs(block[:, part]).max(axis=2, initial=0.0)
+            some = large > least * large.max(axis=1, initial=0.0)[:, None]
+            told[(members.ends[:, side, None] * b + np.arange(b)[part])[some]] = True
+    return np.asarray(told.reshape(n, b))
 
 
 def in_one_place(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tuple[int, int] | None:

@@ -15,11 +15,11 @@ from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason, count_of
 from .answer import HeldStructure, about_loose, answer
-from .certificate import forces, in_one_place, members_misfits, mispaired
+from .certificate import forces, in_one_place, members_misfits, mispaired, next_to_gaps, shown
 from .contradicted import said_of
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
-from .placed import PlacedNodes
+from .placed import PlacedNodes, without
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
 from .turning import turning_positions
@@ -46,7 +46,8 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
 
     def again(other: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         nodes, _, again, valid = _placed(other, numbering, rounding, members.ends)
-        return again.points, forces(other, numbering, nodes, again.points, valid)[0]
+        points = np.where(strange[:, None], np.nan, again.points)
+        return points, forces(other, numbering, nodes, points, valid)[0]
 
     def doubt() -> Reason | None:
         """Whether rows of different nodes were joined, or nodes came out in one place that are not."""
@@ -63,6 +64,11 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
         unlike = f"those of rows {first} and {second}, as numbered, do not couple like the rows of two nodes"
         return Reason(f"which rows belong to one node is not certain: {unlike}", advice=GIVE_NUMBERING)
 
+    strange = np.zeros(nodes.n, dtype=bool)
+    if numbering.kind != "given":
+        doubtful = next_to_gaps(nodes.row_of, numbering.direction_of_row < 0)
+        strange = (doubtful & ~shown(nodes, members, found.points, valid)).any(axis=1) & (found.component >= 0)
+        found = without(found, strange)
     straight = found.points
     force, used = forces(whole, numbering, nodes, straight, valid)
     ends, misfit = members_misfits(members, layout, straight)
@@ -104,6 +110,9 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
                      f"left out unless you {GIVE_NUMBERING}")  # fmt: skip
+    if strange.any():
+        notes.append(f"{count_of(int(strange.sum()), 'node')} lost the position, as nothing shows that all of the rows "
+                     f"are of one node: {GIVE_NUMBERING}")  # fmt: skip
     notes += about_loose(found.component < 0, "at supports, or tied to these only")
     free = "size and sign are free: nodes have no rotations, from which angles would tell lengths"
     edges, fields["operator"] = np.column_stack(sp.triu(nodes.graph, 1).nonzero()), layout.name

@@ -71,7 +71,8 @@ def unnoticed_in(
 
     Disturbances are any of a single equation; springs along an axis between two coupled nodes; springs that are the
     same between all coupled nodes, or between the rotations of all nodes and the ground, as regular lattices could take
-    them for a change of size. `row` counts the piece's own nodes; `probes` (m, k) are residuals of random right sides.
+    them for a change of size. `row` counts the piece's own nodes, `probes` (m, k) are residuals of random right-hand
+    sides.
     """
     blind = _small(probes)
     b, moves, turns = layout.block_size, len(layout.displacements), len(layout.turning)

@@ -1,7 +1,7 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +74,14 @@ class PlacedNodes:
     def null_dimension(self) -> int:
         """Largest dimension of the null space of a piece."""
         return max(one.null_dimension for one in self.evidence)
+
+
+def without(found: PlacedNodes, lost: NDArray[np.bool_]) -> PlacedNodes:
+    """The same without the positions of some nodes, (n,); GeometryError where none is left."""
+    if lost.any() and not (found.component[~lost] >= 0).any():
+        raise GeometryError("nothing shows which rows belong to one node: give the numbering if it is known")
+    points = np.where(lost[:, None], np.nan, found.points)
+    return replace(found, points=points, component=np.where(lost, -1, found.component))
 
 
 def without_free(found: PlacedNodes, most: int) -> PlacedNodes:
