@@ -12,13 +12,14 @@ own (W. McGuire, R. H. Gallagher, R. D. Ziemian, Matrix Structural Analysis, 2nd
 numbers of its section taken from the block itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from numpy.typing import NDArray
 
-from ..tolerances import LAST_DIGITS, PENALTY
+from ..tolerances import CANCELLED, LAST_DIGITS, PENALTY
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class StructureCheck:
     rows: NDArray[np.bool_]  # (N,) rows that say so
     unknowns: NDArray[np.bool_]  # (N,) that these touch
     unexplained: NDArray[np.int64]  # rows that lack nothing and yet do not annihilate a rotation, the worst first
+    # rows that do not annihilate translations, in a way that neither supports nor springs bring about, the worst first
+    unsupported: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
     def share(self) -> float:
@@ -88,7 +91,8 @@ def check_structure(
     error = float(np.maximum(said, misfit.max(initial=0.0)))  # NaN stays
     if error <= allowed and not counts.any():  # all that is wrong is excused, and nothing is right
         error = float("nan")
-    return StructureCheck(error, counts, touched_by(matrix, counts), unexplained)
+    unsupported = _unsupported(matrix, node_of_row, direction_of_row, len(displacements), members, allowed)
+    return StructureCheck(error, counts, touched_by(matrix, counts), unexplained, unsupported)
 
 
 def touched_by(matrix: sp.csr_array, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -165,6 +169,63 @@ def _forces(
         lacking = added(lacks[node[j]].astype(float)) > 0
         due[:, k] = sound & still[:, across].all(axis=1) & ~lacking & (size > 0)
     return _Forces(force, size, due)
+
+
+def _unsupported(
+    matrix: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    moves: int,
+    members: NDArray[np.int64],
+    allowed: float,
+) -> NDArray[np.int64]:
+    """Rows that do not annihilate translations, in a way that no support explains, the worst first.
+
+    What supports leave of an element is a principal submatrix of its stiffness, so that its energy in a translation of
+    all that is left is not negative; nor is that of springs. Rows of whole elements have none. So the forces under unit
+    translations, added up over nodes that share what supports left of elements, make up a matrix (moves, moves) that is
+    symmetric and positive semidefinite, with the sign of the matrix. Which nodes share such an element is not known:
+    those are taken together that are coupled otherwise than by a whole member.
+    """
+    n = int(node.max()) + 1
+    entry = matrix.tocoo()
+    told = direction >= 0
+    live = told[entry.row] & told[entry.col] & (direction[entry.row] < moves) & (direction[entry.col] < moves)
+    i, value = node[entry.row[live]], entry.data[live] * np.sign(matrix.diagonal().sum())
+    a, b = direction[entry.row[live]], direction[entry.col[live]]
+    shift, size = np.zeros((n, moves, moves)), np.zeros((n, moves))
+    np.add.at(shift, (i, a, b), value)
+    np.add.at(size, (i, a), np.abs(value))
+    unit = np.where(size > 0, size, 1.0)
+    lacking = (np.abs(shift) > allowed * unit[:, :, None]).any(axis=(1, 2))
+    if not lacking.any():
+        return np.empty(0, np.int64)
+
+    there = np.zeros((n, int(direction.max()) + 1), dtype=bool)
+    there[node[told], direction[told]] = True
+    whole = there.all(axis=1)
+    p, q = node[entry.row], node[entry.col]
+    key = np.minimum(p, q) * n + np.maximum(p, q)
+    ends = np.sort(members, axis=1) @ np.array([n, 1])
+    by_member = np.isin(key, ends) & whole[p] & whole[q]
+    joined = lacking[p] & lacking[q] & (p != q) & ~by_member
+    graph = sp.coo_array((np.ones(joined.sum()), (p[joined], q[joined])), shape=(n, n))
+    _, group = connected_components(graph, directed=False)
+
+    rest, whole_size = np.zeros((n, moves, moves)), np.zeros((n, moves))
+    np.add.at(rest, group[lacking], shift[lacking])
+    np.add.at(whole_size, group[lacking], size[lacking])
+    diagonal = np.abs(np.diagonal(rest, axis1=1, axis2=2))
+    scale = np.sqrt(np.maximum(np.where(whole_size > 0, whole_size, 1.0), diagonal))
+    relative = rest / (scale[:, :, None] * scale[:, None, :])
+    turned = relative.transpose(0, 2, 1)
+    least = np.linalg.eigvalsh((relative + turned) / 2)[:, 0]
+    wrong = np.maximum(-least, np.abs(relative - turned).max(axis=(1, 2)))
+    odd = wrong > CANCELLED + allowed
+    rows = np.flatnonzero(odd[group[node]] & lacking[node] & told & (direction < moves))
+    off = (np.abs(shift) / unit[:, :, None]).max(axis=2)[node[rows], direction[rows]]
+    rows, off = rows[off > allowed], off[off > allowed]
+    return rows[np.argsort(-off, kind="stable")]
 
 
 def _springs_to_ground(
