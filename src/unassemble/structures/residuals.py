@@ -1,7 +1,7 @@
-"""The certificate of a structure's coordinates: its rigid rotations cost nothing, and its members' blocks are theirs.
+"""What the positions of a structure leave of the matrix they were found from, before they are written.
 
-Positions come from other formulas. Here members between the points, as they are written, are set up by the textbook.
-The couplings of nodes show whether their rows were joined rightly.
+Forces under rigid rotations, and blocks of straight members, by formulas that finding has in common; redrawn rounding
+is measured by them. The certificate has others. The couplings of nodes show whether their rows were joined rightly.
 """
 
 import numpy as np
