@@ -23,9 +23,7 @@ _LOADED = (
 )
 _NOTHING_COMPARED = "all rows of the matrix lack something, so that none of them can be held against the coordinates"
 _NO_LENGTH = "nodes that members join lie in one place, or entries are missing that these members have"
-_UNSUPPORTED = (
-    " do not annihilate translations, and no supports and no springs bring that about: entries there are wrong"
-)
+_UNSUPPORTED = " do not add up to zero, and neither supports nor springs bring that about: entries there are wrong"
 _WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without springs"
 
 
@@ -58,8 +56,6 @@ class HeldStructure:
         else:
             said = _NO_LENGTH if np.isinf(error) else self.said[1].format(error=error)
             yield from known.objections(error, self.rounding, said + _most_in(check))
-        if len(check.unsupported):
-            yield Reason(_rows_of(check.unsupported) + _UNSUPPORTED)
         if found.loaded:
             yield Reason(_LOADED, advice=_WITHOUT_LOADS)
         if found.unnoticed.any():
@@ -68,6 +64,8 @@ class HeldStructure:
                 f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
             )
             yield Reason(unseen, advice=WITHOUT_SUPPORTS)
+        if len(check.unsupported):
+            yield Reason(_rows_of(check.unsupported) + _UNSUPPORTED)
 
     def fits(self, known: Known, check: StructureCheck) -> str:
         """What holds, how far it determines positions, and which rows say so."""
