@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from built import PLANE, PLATE, frame, grillage, plane_frame, plate, shell, truss
+from built import PLANE, PLATE, frame, grillage, plane_frame, plate, shell, truss, vault
 
 from unassemble import recover
 from unassemble.certificate import check_bars, check_structure
@@ -253,3 +253,54 @@ def test_a_piece_of_one_node_is_where_it_is():
     component = np.append(np.zeros(len(given.points), np.int64), 1)
     known = known_to(points, component, np.zeros(3), rounding, lambda _: (points, np.zeros(3)), sized=True)
     assert known.error == 0
+
+
+@pytest.mark.parametrize("make", [frame, plane_frame], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("share", [0.3, -0.3, 1e-6])
+@pytest.mark.parametrize("clamped", [False, True])
+def test_entries_that_no_support_leaves_are_an_objection(make, sign, share, clamped):
+    """Between displacements of two nodes, along different axes: of nodes without a member, and with one."""
+    given = make().permuted(1)
+    if clamped:
+        given = given.clamped(given.points[:, -1] < given.points[:, -1].min() + 0.3)
+    block, order = given.block, given.matrix.shape[0]
+    moved = given.matrix @ (np.arange(order)[:, None] % block == np.arange(2))
+    still = np.abs(moved).reshape(-1, 2 * block).max(axis=1) < 1e-6 * abs(given.matrix).max()
+    pairs = [(int(i), int(j)) for i, j in given.members if still[i] and still[j]]
+    first = pairs[0][0]
+    apart = set(np.flatnonzero(still).tolist()) - set(given.members[(given.members == first).any(axis=1)].ravel())
+    for i, j in (pairs[0], (first, max(apart))):
+        wrong = share * given.matrix[block * i, block * i]
+        matrix = sign * (given.matrix + entry(order, block * i, block * j + 1, wrong))
+        others = given.members[~np.isin(given.members, (i, j)).all(axis=1)]
+        found = checked(replace(given, members=others), matrix=matrix)
+        assert {block * i, block * j + 1} <= set(found.unsupported.tolist())
+        assert recover(matrix).status != "certified"
+
+
+@pytest.mark.parametrize("make", [*MAKE, lambda: vault()], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_supports_and_springs_leave_what_they_may(make, sign):
+    given = make().permuted(1)
+    order = given.matrix.shape[0]
+    rng = np.random.default_rng(1)
+    held = rng.choice(order, 9, replace=False)
+    stiff = float(abs(given.matrix).max())
+    rollers = sp.csr_array(given.matrix + sp.diags_array(np.isin(np.arange(order), held) * 1e8 * stiff))
+    springs = given.with_springs(held[:4], held[4:8]).matrix
+    for matrix in (given.matrix, rollers, springs):
+        assert not len(checked(given, matrix=sign * matrix, members=matrix is not springs).unsupported)
+    left = np.setdiff1d(np.arange(order), held)
+    displacements, rotations = AXES[6 if given.block == 6 else given.unknowns]
+    found = check_structure(
+        sp.csr_array(sign * given.matrix[left][:, left]),
+        left // given.block,
+        left % given.block,
+        given.points,
+        displacements,
+        rotations,
+        members=np.sort(given.members, axis=1),
+        allowed=1e-9,
+    )
+    assert not len(found.unsupported)

@@ -12,13 +12,14 @@ own (W. McGuire, R. H. Gallagher, R. D. Ziemian, Matrix Structural Analysis, 2nd
 numbers of its section taken from the block itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
-from ..tolerances import LAST_DIGITS, PENALTY
+from ..tolerances import CANCELLED, CERTIFIED, LAST_DIGITS, PENALTY
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class StructureCheck:
     rows: NDArray[np.bool_]  # (N,) rows that say so
     unknowns: NDArray[np.bool_]  # (N,) that these touch
     unexplained: NDArray[np.int64]  # rows that lack nothing and yet do not annihilate a rotation, the worst first
+    # rows that do not annihilate translations, in a way that neither supports nor springs bring about, the worst first
+    unsupported: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
     def share(self) -> float:
@@ -39,6 +42,26 @@ class StructureCheck:
     def worst(self, count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """No pairs of rows: single entries of a structure are not told apart."""
         return np.empty((0, 2), np.int64), np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Which unknown of a structure each row belongs to."""
+
+    node: NDArray[np.int64]  # (N,)
+    direction: NDArray[np.int64]  # (N,) those of displacements first, then those of rotations; -1 where not known
+    displacements: tuple[int, ...]  # axes
+    rotations: tuple[int, ...]  # axes
+
+    @property
+    def moves(self) -> int:
+        """How many displacements a node has."""
+        return len(self.displacements)
+
+    @property
+    def block_size(self) -> int:
+        """How many unknowns a node has."""
+        return len(self.displacements) + len(self.rotations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,24 +94,26 @@ def check_structure(
     x = np.zeros((len(points), 3))
     x[:, : points.shape[1]] = points
     matrix = _without_rounding(matrix)
-    forces = _forces(matrix, node_of_row, direction_of_row, x, displacements, rotations, allowed)
+    rows = _Rows(node_of_row, direction_of_row, displacements, rotations)
+    forces = _forces(matrix, rows, x, allowed)
     others = np.isin(node_of_row, np.empty(0, np.int64) if excused is None else excused)
     relative = np.abs(forces.force) / np.where(forces.size > 0, forces.size, 1.0)[:, None]
     wrong = forces.due & ~(relative <= allowed) & ~others[:, None]
-    ground = _springs_to_ground(forces, node_of_row, direction_of_row, len(displacements), len(rotations), allowed)
+    ground = _springs_to_ground(forces, rows, allowed)
     off = np.where(wrong & ~ground, relative, 0.0).max(axis=1, initial=0.0)
     order = np.argsort(-off, kind="stable")
     unexplained = order[: np.count_nonzero(off)]
     counts = forces.due.any(axis=1) & ~wrong.any(axis=1) & ~others
     misfit = np.empty(0)
     if len(members) and rotations:
-        misfit = _members(matrix, node_of_row, direction_of_row, x, displacements, rotations, members)
+        misfit = _members(matrix, rows, x, members)
         counts |= _only_members(matrix, node_of_row, members) & ~others
     said = np.where(forces.due & ~(wrong & ground) & ~others[:, None], relative, 0.0).max(initial=0.0)
     error = float(np.maximum(said, misfit.max(initial=0.0)))  # NaN stays
     if error <= allowed and not counts.any():  # all that is wrong is excused, and nothing is right
         error = float("nan")
-    return StructureCheck(error, counts, touched_by(matrix, counts), unexplained)
+    unsupported = _unsupported(matrix, rows, members, allowed)
+    return StructureCheck(error, counts, touched_by(matrix, counts), unexplained, unsupported)
 
 
 def touched_by(matrix: sp.csr_array, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -110,17 +135,10 @@ def _without_rounding(matrix: sp.csr_array) -> sp.csr_array:
     return sp.csr_array((entry.data[real], place), shape=matrix.shape)
 
 
-def _forces(
-    matrix: sp.csr_array,
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    x: NDArray[np.float64],
-    displacements: tuple[int, ...],
-    rotations: tuple[int, ...],
-    allowed: float,
-) -> _Forces:
+def _forces(matrix: sp.csr_array, rows: _Rows, x: NDArray[np.float64], allowed: float) -> _Forces:
     """Forces of all rows under rotations about each axis."""
-    order, moves, axes = len(node), len(displacements), rotations or (0, 1, 2)
+    node, direction, displacements, rotations = rows.node, rows.direction, rows.displacements, rows.rotations
+    order, moves, axes = len(node), rows.moves, rotations or (0, 1, 2)
     entry = matrix.tocoo()
     i, j, value = entry.row, entry.col, entry.data
     coupled = np.zeros(order, dtype=bool)
@@ -167,18 +185,66 @@ def _forces(
     return _Forces(force, size, due)
 
 
-def _springs_to_ground(
-    forces: _Forces,
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    moves: int,
-    turns: int,
-    allowed: float,
-) -> NDArray[np.bool_]:
+def _unsupported(matrix: sp.csr_array, rows: _Rows, members: NDArray[np.int64], allowed: float) -> NDArray[np.int64]:
+    """Rows that do not annihilate translations, in a way that no support explains, the worst first.
+
+    What supports leave of an element is a principal submatrix of its stiffness, so that its energy in a translation of
+    all that is left is not negative; nor is that of springs. Rows of whole elements have none. So the forces under unit
+    translations, added up over nodes that share what supports left of elements, make up a matrix (moves, moves) that is
+    symmetric and positive semidefinite, with the sign of the matrix. Which nodes share such an element is not known:
+    those are taken together that are coupled otherwise than by a whole member.
+    """
+    node, direction, moves = rows.node, rows.direction, rows.moves
+    n = int(node.max()) + 1
+    entry = matrix.tocoo()
+    told = direction >= 0
+    live = told[entry.row] & told[entry.col] & (direction[entry.row] < moves) & (direction[entry.col] < moves)
+    i, value = node[entry.row[live]], entry.data[live] * np.sign(matrix.diagonal().sum())
+    a, b = direction[entry.row[live]], direction[entry.col[live]]
+    shift, size = np.zeros((n, moves, moves)), np.zeros((n, moves))
+    np.add.at(shift, (i, a, b), value)
+    np.add.at(size, (i, a), np.abs(value))
+    unit = np.where(size > 0, size, 1.0)
+    lacking: NDArray[np.bool_] = np.asarray((np.abs(shift) > allowed * unit[:, :, None]).any(axis=(1, 2)))
+    if not lacking.any():
+        return np.empty(0, np.int64)
+
+    there = np.zeros((n, int(direction.max()) + 1), dtype=bool)
+    there[node[told], direction[told]] = True
+    whole: NDArray[np.bool_] = np.asarray(there.all(axis=1))
+    p, q = node[entry.row], node[entry.col]
+    key = np.minimum(p, q) * n + np.maximum(p, q)
+    ends = np.sort(members, axis=1) @ np.array([n, 1])
+    by_member = np.isin(key, ends) & whole[p] & whole[q]
+    joined = lacking[p] & lacking[q] & (p != q) & ~by_member
+    graph = sp.coo_array((np.ones(joined.sum()), (p[joined], q[joined])), shape=(n, n))
+    _, group = connected_components(graph, directed=False)
+
+    rest, whole_size = np.zeros((n, moves, moves)), np.zeros((n, moves))
+    np.add.at(rest, group[lacking], shift[lacking])
+    np.add.at(whole_size, group[lacking], size[lacking])
+    diagonal = np.abs(np.diagonal(rest, axis1=1, axis2=2))
+    scale = np.sqrt(np.maximum(np.where(whole_size > 0, whole_size, 1.0), diagonal))
+    relative = rest / (scale[:, :, None] * scale[:, None, :])
+    turned = relative.transpose(0, 2, 1)
+    least = np.linalg.eigvalsh((relative + turned) / 2)[:, 0]
+    wrong = np.maximum(-least, np.abs(relative - turned).max(axis=(1, 2)))
+    # Rounding to few digits leaves as much in stiff directions as in soft ones.
+    soft = np.where(whole_size > 0, whole_size, np.inf).min(axis=1)
+    stiffer = np.sqrt(whole_size.max(axis=1) / soft) if allowed > CERTIFIED else np.ones(n)
+    odd = wrong > (CANCELLED + allowed) * np.maximum(stiffer, 1.0)
+    where = np.flatnonzero(odd[group[node]] & lacking[node] & told & (direction < moves))
+    off = (np.abs(shift) / unit[:, :, None]).max(axis=2)[node[where], direction[where]]
+    where, off = where[off > allowed], off[off > allowed]
+    return where[np.argsort(-off, kind="stable")]
+
+
+def _springs_to_ground(forces: _Forces, rows: _Rows, allowed: float) -> NDArray[np.bool_]:
     """(N, axes) moments that springs between the rotations of a node and the ground may have.
 
     Such springs have a symmetric matrix. Of two moments that mirror each other one alone shows nothing.
     """
+    node, direction, moves, turns = rows.node, rows.direction, rows.moves, len(rows.rotations)
     may = np.zeros(forces.force.shape, dtype=bool)
     row_at = np.full((int(node.max()) + 1, turns), -1)
     turning = np.flatnonzero(direction >= moves)
@@ -196,29 +262,23 @@ def _springs_to_ground(
 
 
 def _members(
-    matrix: sp.csr_array,
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    x: NDArray[np.float64],
-    displacements: tuple[int, ...],
-    rotations: tuple[int, ...],
-    members: NDArray[np.int64],
+    matrix: sp.csr_array, rows: _Rows, x: NDArray[np.float64], members: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """(m,) largest misfit of the block of each member's nodes, relative to the part of it where it is largest.
 
     Members without positions at both ends are left out. Parts couple displacements or rotations to either.
     """
-    b, moves = len(displacements) + len(rotations), len(displacements)
+    node, direction, b, moves = rows.node, rows.direction, rows.block_size, rows.moves
     members = members[determined(x)[members].all(axis=1)]
     row_at = np.full((len(x), b), -1)
     told = np.flatnonzero(direction >= 0)
     row_at[node[told], direction[told]] = told
     members = members[(row_at[members] >= 0).all(axis=(1, 2))]
-    rows, columns = np.broadcast_arrays(row_at[members[:, 0], :, None], row_at[members[:, 1], None, :])
+    first_end, second_end = np.broadcast_arrays(row_at[members[:, 0], :, None], row_at[members[:, 1], None, :])
     if not len(members):
         return np.empty(0)
-    block = np.asarray(sp.coo_array(matrix[rows.ravel(), columns.ravel()]).toarray()).reshape(-1, b, b)
-    axes = np.array([*displacements, *(3 + a for a in rotations)])
+    block = np.asarray(sp.coo_array(matrix[first_end.ravel(), second_end.ravel()]).toarray()).reshape(-1, b, b)
+    axes = np.array([*rows.displacements, *(3 + a for a in rows.rotations)])
     whole = np.zeros((len(block), 6, 6))
     whole[:, axes[:, None], axes] = block
     again = _member_between(whole, x[members[:, 1]] - x[members[:, 0]])[:, axes[:, None], axes]

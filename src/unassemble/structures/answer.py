@@ -23,6 +23,7 @@ _LOADED = (
 )
 _NOTHING_COMPARED = "all rows of the matrix lack something, so that none of them can be held against the coordinates"
 _NO_LENGTH = "nodes that members join lie in one place, or entries are missing that these members have"
+_UNSUPPORTED = " do not add up to zero, and neither supports nor springs bring that about: entries there are wrong"
 _WITHOUT_LOADS = "assemble the matrix without geometric stiffness, and without springs"
 
 
@@ -63,6 +64,8 @@ class HeldStructure:
                 f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
             )
             yield Reason(unseen, advice=WITHOUT_SUPPORTS)
+        if len(check.unsupported):
+            yield Reason(_rows_of(check.unsupported) + _UNSUPPORTED)
 
     def fits(self, known: Known, check: StructureCheck) -> str:
         """What holds, how far it determines positions, and which rows say so."""
@@ -73,11 +76,25 @@ class HeldStructure:
 
 def _most_in(check: StructureCheck) -> str:
     """Which rows the certificate does not explain, in words."""
-    worst = check.unexplained[:3]
-    if not len(worst):
-        return ""
-    more = " and others" if len(check.unexplained) > len(worst) else ""
-    return f", most in {'row' if len(worst) == 1 else 'rows'} {words_of(worst.tolist())}{more}"
+    return f", most in {_rows_of(check.unexplained)}" if len(check.unexplained) else ""
+
+
+def _rows_of(rows: NDArray[np.int64]) -> str:
+    """The first of some rows, in words: ``rows 3, 7, 9 and others``."""
+    more = " and others" if len(rows) > 3 else ""
+    return f"{'row' if len(rows) == 1 else 'rows'} {words_of(rows[:3].tolist())}{more}"
+
+
+def _about_silent(check: StructureCheck) -> list[str]:
+    """What there is to say of rows that were not compared."""
+    silent = np.flatnonzero(~check.rows)
+    if not len(silent):
+        return []
+    count = count_of(len(silent), "row is", "rows are")
+    return [
+        f"{count} not compared, as next to supports or with springs ({_rows_of(silent)}): wrong entries between such "
+        "rows may go unnoticed"
+    ]
 
 
 def about_loose(loose: NDArray[np.bool_], why: str) -> list[str]:
@@ -129,6 +146,7 @@ def answer(
             against.append(doubts)
         allowed = np.inf if held.rounding else CERTIFIED
         fits = held.fits(known, check)
-        return Examined(Findings((fits,), check.backward_error, tuple(against), allowed=allowed))
+        notes = [] if against else _about_silent(check)
+        return Examined(Findings((fits,), check.backward_error, tuple(against), allowed=allowed), notes)
 
     return finish(request.clock, place, lambda mesh: held.check(mesh.points), examine)

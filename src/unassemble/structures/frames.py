@@ -15,12 +15,12 @@ from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED
 from ..words import GIVE_NUMBERING, Reason, count_of
 from .answer import HeldStructure, about_loose, answer
-from .certificate import forces, in_one_place, members_misfits, mispaired, next_to_gaps, shown
 from .contradicted import said_of
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
 from .placed import PlacedNodes, without
 from .recognise import StructuralNumbering
+from .residuals import forces, in_one_place, members_misfits, mispaired, next_to_gaps, shown
 from .straight import Straight, straight_members
 from .turning import turning_positions
 

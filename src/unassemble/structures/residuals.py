@@ -1,7 +1,7 @@
-"""The certificate of a structure's coordinates: its rigid rotations cost nothing, and its members' blocks are theirs.
+"""What the positions of a structure leave of the matrix they were found from, before they are written.
 
-Positions come from other formulas. Here members between the points, as they are written, are set up by the textbook.
-The couplings of nodes show whether their rows were joined rightly.
+Forces under rigid rotations, and blocks of straight members, by formulas that finding has in common; redrawn rounding
+is measured by them. The certificate has others. The couplings of nodes show whether their rows were joined rightly.
 """
 
 import numpy as np
@@ -105,9 +105,7 @@ def next_to_gaps(row_of: NDArray[np.int64], untold: NDArray[np.bool_]) -> NDArra
     return np.asarray((row_of >= 0) & beside[row_of])
 
 
-def shown(
-    nodes: Nodes, members: Straight, points: NDArray[np.float64], valid: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def shown(nodes: Nodes, members: Straight, points: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(n, b) rows of nodes that equations show to be theirs, and of their direction.
 
     A row that annihilates translations shows it: its own entry takes part in that if it is a displacement, and does not
