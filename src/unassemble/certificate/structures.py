@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..tolerances import CANCELLED, CERTIFIED, LAST_DIGITS, PENALTY
+from ..tolerances import CANCELLED, LAST_DIGITS, PENALTY
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +229,9 @@ def _unsupported(matrix: sp.csr_array, rows: _Rows, members: NDArray[np.int64], 
     turned = relative.transpose(0, 2, 1)
     least = np.linalg.eigvalsh((relative + turned) / 2)[:, 0]
     wrong = np.maximum(-least, np.abs(relative - turned).max(axis=(1, 2)))
-    # Rounding to few digits leaves as much in stiff directions as in soft ones.
+    # Rounding may leave as much in soft directions as in stiff ones.
     soft = np.where(whole_size > 0, whole_size, np.inf).min(axis=1)
-    stiffer = np.sqrt(whole_size.max(axis=1) / soft) if allowed > CERTIFIED else np.ones(n)
+    stiffer = np.sqrt(whole_size.max(axis=1) / soft)
     odd = wrong > (CANCELLED + allowed) * np.maximum(stiffer, 1.0)
     where = np.flatnonzero(odd[group[node]] & lacking[node] & told & (direction < moves))
     off = (np.abs(shift) / unit[:, :, None]).max(axis=2)[node[where], direction[where]]
