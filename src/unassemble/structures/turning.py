@@ -17,7 +17,7 @@ from .layouts import Layout
 from .least_squares import least_squares, unnoticed_in, up_to_size
 from .loads import told_under_loads
 from .nodes import Nodes
-from .placed import EquationPiece, PlacedNodes, placed, without_free
+from .placed import EquationPiece, PlacedNodes, placed, without, without_free
 from .straight import Straight
 
 
@@ -76,7 +76,8 @@ def _under_loads(
 ) -> PlacedNodes:
     """The same, in doubt where only forces tell positions, and loads could change those of most nodes unnoticed.
 
-    Without rotations no size is told at all. Where moments are used, they contradict loads.
+    Where they could change those of fewer nodes, these lose their positions. Without rotations no size is told at all.
+    Where moments are used, they contradict loads.
     """
     if not layout.rotations or found.residual > allowed:
         return found
@@ -89,7 +90,9 @@ def _under_loads(
         told = told_under_loads(used, layout, found, edges) if told is None else told
         if 2 * np.count_nonzero(told & (found.component == piece)) < np.count_nonzero(found.component == piece):
             return replace(found, loaded=True)
-    return found
+    if told is None:
+        return found
+    return without(found, (found.component >= 0) & ~np.isin(found.component, checked) & ~told)
 
 
 def _doubts(found: PlacedNodes, allowed: float) -> tuple[bool, bool, bool, int, float]:
