@@ -35,7 +35,7 @@ from hostile_inputs import KINDS, Given, Piece, pieces_of
 from numpy.typing import NDArray
 from skfem.models import laplace, mass
 
-from unassemble import ConformingMesh, InputError, RecoveryError, Surface, recover
+from unassemble import ConformingMesh, InputError, PlanarMesh, RecoveryError, Surface, recover
 from unassemble.cli import main as command_line
 from unassemble.matrix import read_matrix
 
@@ -218,7 +218,7 @@ def judged(given: Given) -> str:
     if isinstance(found, Surface):
         return "right" if lengths_give_back(found, sp.csr_array(given.matrix, dtype=np.float64)) else "WRONG"
     right = given.pieces is not None and positions_agree(found, given.pieces)
-    if not hasattr(found, "divided"):  # bodies and structures
+    if not isinstance(found, PlanarMesh):  # bodies and structures
         return "right" if right else "WRONG"
     matrix = sp.csr_array(given.matrix)
     if found.areas is not None:
