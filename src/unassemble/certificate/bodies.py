@@ -120,9 +120,8 @@ def certify_body(
         assembled = _assembled(row_of, points, blocks, lame, usual | {rich: rule}, len(node_of_row)).tocoo()
         rows = compared & ~_hidden(given, assembled, compared, node_of_row, size)
         found = _compared(given, assembled, rows, penalty, size)
-        rest = remainder_of(given, assembled, size, known[node_of_row] & named)
         if best is None or not best.backward_error <= found.backward_error:
-            best = replace(found, remainder=rest)
+            best = replace(found, remainder=remainder_of(given, assembled, size, known[node_of_row] & named))
         if best.backward_error <= CERTIFIED:
             break
     return best if best is not None else _nothing(len(node_of_row))

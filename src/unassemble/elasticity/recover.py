@@ -135,10 +135,11 @@ def _described(nodal: NodalMatrix, numbering: NodeNumbering, solution: Solution,
     allowed = np.full(len(numbering.node_of_row), CERTIFIED)
     if request.rounding:
         allowed = np.maximum(allowed, _rounded_rows(request.rounding, nodal, solution, bar))
+    with request.clock("place"):
+        moved = anchored(request, rows, placed, component, 1.0, free=free)
+    objections.extend(moved.objections(sure))
 
     def place() -> Placed[Body]:
-        moved = anchored(request, rows, placed, component, 1.0, free=free)
-        objections.extend(moved.objections(sure))
         lame, scale = _in_units(shown, component, moved.factor, nodal.dim)
         body = Body(
             **fields_of(shown.blocks),

@@ -123,15 +123,15 @@ def answer(
     """
     with request.clock("certify"):
         known = held.known(found, sized=sized)
-        objections = []
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
-    if 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
-        objections.append(Reason("most nodes that are coupled are in one place", advice=GIVE_NUMBERING))
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
+    with request.clock("place"):
+        moved = anchored(request, rows, found.points, found.component, edge, sized=sized, free=free)
+    objections = list(moved.objections(held.said[0]))
+    if 2 * (length <= ROUNDED * np.nanmax(length, initial=0.0)).sum() > len(edges):
+        objections.insert(0, Reason("most nodes that are coupled are in one place", advice=GIVE_NUMBERING))
 
     def place() -> Placed[Structure]:
-        moved = anchored(request, rows, found.points, found.component, edge, sized=sized, free=free)
-        objections.extend(moved.objections(held.said[0]))
         structure = Structure(
             scale=np.full(len(moved.factor), np.nan),
             position_error=known.error if held.rounding and known.explained else None,
